@@ -1,0 +1,1 @@
+//! Embree 4 for Rust, loaded at run time.

@@ -1,0 +1,2 @@
+//! prt-batch.
+fn main() {}
