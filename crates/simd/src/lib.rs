@@ -1,1 +1,4 @@
 //! Lane types.
+
+mod buffer;
+pub use buffer::Buffer;

@@ -1,0 +1,1 @@
+//! Embree as an [`super::Accel`].

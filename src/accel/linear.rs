@@ -1,0 +1,1 @@
+//! Brute force as an [`super::Accel`]: the oracle.

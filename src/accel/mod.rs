@@ -1,0 +1,58 @@
+//! Ray queries behind one seam: a batch of rays in, a batch of hits out.
+//!
+//! Two implementations trace for pictures: `embree` (libembree4, found at run time) and `wide` (our own 8-wide
+//! BVH). `linear` tests every triangle and is the oracle of the tests. All three find the same hits.
+
+mod batch;
+pub mod embree;
+pub mod linear;
+pub mod wide;
+
+pub use batch::{HitBatch, MISS, RayBatch};
+
+use std::ops::Range;
+
+/// Triangles in the prepared scene's space (metres, recentred), what every backend is built from.
+/// Vertices are finite and below 1.844e18 in magnitude and indices are in range: `render::prepare` sees to it.
+#[derive(Clone, Debug, Default)]
+pub struct Triangles {
+    /// `[n][3]` metres.
+    pub positions: Vec<[f32; 3]>,
+    /// `[m][3]`; a hit's `primitive` is an index into this.
+    pub indices: Vec<[u32; 3]>,
+}
+
+impl Triangles {
+    /// The three corners of triangle `i`.
+    pub fn corners(&self, i: usize) -> [glam::Vec3; 3] {
+        self.indices[i].map(|v| glam::Vec3::from_array(self.positions[v as usize]))
+    }
+}
+
+/// What a backend says about itself, for logs and JSON.
+#[derive(Clone, Debug, Default)]
+pub struct AccelStats {
+    /// `embree`, `bvh` or `linear`.
+    pub name: &'static str,
+    /// Version of the library behind it; empty for our own.
+    pub version: String,
+    /// Instruction set in use, such as `avx512`.
+    pub isa: String,
+    /// Bytes held, as far as known.
+    pub bytes: usize,
+}
+
+/// A built acceleration structure. Called once per batch of about 2000 rays, so `dyn` costs nothing here.
+///
+/// Rays run from t = 0 (exclusive of nothing: origins are already offset) to `t_max`; a ray with a non-finite
+/// origin or direction misses. Ties (equal t) go to the lowest primitive for `bvh` and `linear`.
+pub trait Accel: Send + Sync {
+    /// Nearest hits of `rays[range]` into `hits[range]`. `coherent` is a hint: camera rays in pixel order.
+    fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch);
+
+    /// Whether anything lies in (0, t_max) of `rays[..n]`: 1 or 0 into `occluded[..n]`.
+    fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]);
+
+    /// What this is.
+    fn stats(&self) -> AccelStats;
+}

@@ -1,0 +1,1 @@
+//! Our own 8-wide BVH.

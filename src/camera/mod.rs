@@ -1,0 +1,26 @@
+//! Cameras as described by the file.
+
+use glam::DMat4;
+
+/// A camera with its place; looks along its local -Z, +Y up.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// The camera's name, else its node's; may be empty.
+    pub name: String,
+    /// Rigid: rotation and translation (metres) of the node, scale removed.
+    pub world_from_camera: DMat4,
+    /// How points become pixels.
+    pub projection: Projection,
+}
+
+/// How points become pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole.
+    Perspective {
+        /// Vertical field of view, radians, in (0, pi).
+        yfov: f64,
+        /// Width over height as the file has it; yields to the picture's own size.
+        aspect_ratio: Option<f64>,
+    },
+}

@@ -1,0 +1,116 @@
+//! From a scene and settings to a [`Frame`].
+
+mod settings;
+
+pub use settings::{AccelChoice, Brdf, CropWindow, Filter, RenderSettings};
+
+use crate::error::RenderError;
+use crate::scene::Scene;
+use std::sync::atomic::{AtomicBool, AtomicU64};
+
+/// Watched and steered from another thread while a frame renders.
+#[derive(Debug, Default)]
+pub struct Progress {
+    /// Camera samples finished.
+    pub done: AtomicU64,
+    /// Camera samples to do in all; 0 until known.
+    pub total: AtomicU64,
+    /// Rays traced so far.
+    pub rays: AtomicU64,
+    /// Set it and the render ends soon with [`RenderError::Interrupted`].
+    pub cancel: AtomicBool,
+}
+
+/// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
+#[derive(Clone, Copy, Debug)]
+pub struct FrameCamera {
+    /// Rigid, right-handed, camera looking along -Z; world space of the file.
+    pub world_from_camera: glam::DMat4,
+    /// Vertical field of view in radians.
+    pub yfov: f64,
+    /// Width over height of the whole picture.
+    pub aspect_ratio: f64,
+}
+
+/// How the backend was chosen and what it is.
+#[derive(Clone, Debug, Default)]
+pub struct AccelReport {
+    /// As asked: `auto`, `embree`, `bvh`, `linear`.
+    pub requested: &'static str,
+    /// `embree`, `bvh` or `linear`.
+    pub used: &'static str,
+    /// Version of the library, empty for our own.
+    pub version: String,
+    /// Instruction set of the ray kernels, such as `avx512`.
+    pub isa: String,
+    /// Why `auto` did not take Embree; empty if it did.
+    pub note: String,
+}
+
+/// Counts and times of one frame.
+#[derive(Clone, Debug, Default)]
+pub struct RenderStats {
+    /// Wall seconds to flatten the scene and build light tables and the acceleration structure.
+    pub build_seconds: f64,
+    /// Wall seconds of sampling.
+    pub render_seconds: f64,
+    /// Camera rays.
+    pub camera_rays: u64,
+    /// Rays continued after a scattering.
+    pub bounce_rays: u64,
+    /// Rays towards lights.
+    pub shadow_rays: u64,
+    /// Samples dropped because a channel was not finite.
+    pub non_finite_samples: u64,
+    /// The first few of them: (pixel x, pixel y, sample).
+    pub non_finite_examples: Vec<(u32, u32, u32)>,
+    /// Share of paths ended by the bounce limit that is a safety cap (not by `--max-bounces`).
+    pub truncated: f64,
+    /// Triangles after flattening.
+    pub triangles: u64,
+    /// Placed meshes.
+    pub instances: u64,
+    /// Lights: punctual ones and emissive triangles.
+    pub lights: u64,
+    /// Named yes/no facts about the scene, as in `features` of the JSON.
+    pub features: Vec<(&'static str, bool)>,
+    /// Which backend and why.
+    pub accel: AccelReport,
+    /// SIMD lanes that shaded: 1, 8 or 16.
+    pub lanes: u32,
+    /// Said to the user and written into the JSON.
+    pub warnings: Vec<String>,
+}
+
+/// A rendered picture. `pixels` covers `window` only, row by row from the top.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Size of the whole picture.
+    pub width: u32,
+    /// Size of the whole picture.
+    pub height: u32,
+    /// The part that was rendered (the whole picture without `--crop`).
+    pub window: CropWindow,
+    /// `[window.height * window.width]` linear Rec.709 radiance, nits; alpha is 1.
+    pub pixels: Vec<[f32; 3]>,
+    /// Samples per pixel.
+    pub spp: u32,
+    /// For the EXR's matrices.
+    pub camera: FrameCamera,
+    /// Counts and times.
+    pub stats: RenderStats,
+}
+
+/// Renders camera `camera` of `scene` (an index into `scene.cameras`; a scene without cameras has one framed on its
+/// bounds, index 0).
+///
+/// # Errors
+/// The backend is not to be had, the scene is too large, or `progress.cancel` was set.
+pub fn render(
+    _scene: &Scene,
+    _camera: usize,
+    _settings: &RenderSettings,
+    _progress: &Progress,
+) -> Result<Frame, RenderError> {
+    Err(RenderError::Interrupted)
+}

@@ -1,0 +1,115 @@
+//! What a picture depends on beside the scene.
+
+use std::path::PathBuf;
+
+/// Which ray backend.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AccelChoice {
+    /// Embree if its library is found, else our BVH.
+    #[default]
+    Auto,
+    /// Embree or an error.
+    Embree,
+    /// Our own BVH.
+    Bvh,
+    /// Brute force, for tests.
+    Linear,
+}
+
+/// Which microfacet model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Brdf {
+    /// The single-scattering formulas of glTF 2.0 appendix B with height-correlated G.
+    #[default]
+    AppendixB,
+}
+
+/// Pixel filter, sampled by importance; `width` is its full support in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Filter {
+    /// Constant over the support.
+    Box {
+        /// Full support, pixels.
+        width: f32,
+    },
+    /// Falls linearly from the centre to the edge of the support.
+    Tent {
+        /// Full support, pixels.
+        width: f32,
+    },
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Self::Tent { width: 2.0 }
+    }
+}
+
+/// A window of the picture in pixels, origin top left, y down; inside the picture and not empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CropWindow {
+    /// Left edge.
+    pub x: u32,
+    /// Top edge.
+    pub y: u32,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+/// Settings of one frame.
+#[derive(Clone, Debug)]
+pub struct RenderSettings {
+    /// Pixels across, >= 1.
+    pub width: u32,
+    /// Pixels down, >= 1.
+    pub height: u32,
+    /// Render only this window; its pixels equal those of the whole picture.
+    pub crop: Option<CropWindow>,
+    /// Samples per pixel, >= 1.
+    pub spp: u32,
+    /// Same seed, same pixels.
+    pub seed: u64,
+    /// Animation frame number; part of the random numbers.
+    pub frame: u32,
+    /// Scatterings after the first; `None` = roulette alone ends paths (safety cap [`RenderSettings::BOUNCE_CAP`]).
+    pub max_bounces: Option<u32>,
+    /// Pixel filter.
+    pub filter: Filter,
+    /// Microfacet model.
+    pub brdf: Brdf,
+    /// Ray backend.
+    pub accel: AccelChoice,
+    /// Folders in which libembree4 is looked for, after `EMBREE_DIR` and before the system's.
+    pub embree_dirs: Vec<PathBuf>,
+    /// Worker threads; `None` = the cores this process may use. Does not change a byte of the picture.
+    pub threads: Option<usize>,
+    /// SIMD lanes for shading (1, 8, 16); `None` = the most this CPU has. For tests.
+    pub lanes: Option<u32>,
+}
+
+impl RenderSettings {
+    /// Scatterings at which a path is cut whatever roulette says; the share of paths cut is reported.
+    pub const BOUNCE_CAP: u32 = 1024;
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            width: 1280,
+            height: 720,
+            crop: None,
+            spp: 64,
+            seed: 0,
+            frame: 0,
+            max_bounces: None,
+            filter: Filter::default(),
+            brdf: Brdf::default(),
+            accel: AccelChoice::default(),
+            embree_dirs: Vec::new(),
+            threads: None,
+            lanes: None,
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
+
+use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, TextureId};
+use crate::camera::Camera;
+use crate::material::Material;
+use crate::shape::Mesh;
+use crate::texture::{Image, Texture};
+
+/// A scene under construction.
+#[derive(Debug, Default)]
+pub struct SceneBuilder {
+    scene: Scene,
+}
+
+macro_rules! add {
+    ($method:ident, $field:ident, $thing:ty, $id:ident) => {
+        #[doc = concat!("Adds to `", stringify!($field), "`; the id is its place there.")]
+        pub fn $method(&mut self, thing: $thing) -> $id {
+            self.scene.$field.push(thing);
+            $id((self.scene.$field.len() - 1) as u32)
+        }
+    };
+}
+
+impl SceneBuilder {
+    /// An empty scene with the file's scene index.
+    pub fn new(index: usize) -> Self {
+        Self { scene: Scene { index, ..Scene::default() } }
+    }
+
+    add!(add_mesh, meshes, Mesh, MeshId);
+    add!(add_material, materials, Material, MaterialId);
+    add!(add_texture, textures, Texture, TextureId);
+    add!(add_image, images, Image, ImageId);
+
+    /// Places a mesh.
+    pub fn add_instance(&mut self, instance: Instance) {
+        self.scene.instances.push(instance);
+    }
+
+    /// Places a light.
+    pub fn add_light(&mut self, light: PlacedLight) {
+        self.scene.lights.push(light);
+    }
+
+    /// Adds a camera.
+    pub fn add_camera(&mut self, camera: Camera) {
+        self.scene.cameras.push(camera);
+    }
+
+    /// Notes something the user should know.
+    pub fn warn(&mut self, warning: impl Into<String>) {
+        self.scene.warnings.push(warning.into());
+    }
+
+    /// Notes a part of the file that was not needed.
+    pub fn skip(&mut self, what: impl Into<String>, why: impl Into<String>) {
+        self.scene.skipped.push(Skipped { what: what.into(), why: why.into() });
+    }
+
+    /// The finished scene: ids in range, triangles without area or with unusable vertices dropped and counted.
+    ///
+    /// # Panics
+    /// When a loader handed out an id that does not exist: a bug in that loader, not in its input.
+    pub fn finish(mut self) -> Scene {
+        super::check::check(&mut self.scene);
+        self.scene
+    }
+}

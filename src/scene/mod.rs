@@ -1,0 +1,96 @@
+//! The description of a scene: what a loader produces and a user could read. It holds no backend and no settings;
+//! `render::prepare` turns it into machinery.
+
+mod builder;
+mod check;
+
+pub use builder::SceneBuilder;
+
+use crate::camera::Camera;
+use crate::light::Light;
+use crate::material::Material;
+use crate::shape::Mesh;
+use crate::texture::{Image, Texture};
+use glam::DMat4;
+
+macro_rules! id {
+    ($name:ident, $of:literal) => {
+        #[doc = concat!("Index of ", $of, " in its [`Scene`].")]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub struct $name(pub u32);
+
+        impl $name {
+            /// As an index into the scene's list.
+            pub fn index(self) -> usize {
+                self.0 as usize
+            }
+        }
+    };
+}
+id!(MeshId, "a mesh");
+id!(MaterialId, "a material");
+id!(TextureId, "a texture");
+id!(ImageId, "an image");
+
+/// A mesh placed in the world.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// What is placed.
+    pub mesh: MeshId,
+    /// Object to world space, metres; any affine map, kept in f64 until the vertices are flattened.
+    pub world_from_object: DMat4,
+    /// The node's name, for messages.
+    pub name: String,
+}
+
+/// A light placed in the world (emissive surfaces are materials, not lights).
+#[derive(Clone, Debug)]
+pub struct PlacedLight {
+    /// The light's own parameters.
+    pub light: Light,
+    /// Rigid part of the node's transform: a light's intensity is not scaled by nodes.
+    pub world_from_light: DMat4,
+    /// The node's name, for messages.
+    pub name: String,
+}
+
+/// Something in the file that the picture does not need and that was not read.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Skipped {
+    /// JSON pointer without the leading slash, such as `images/3`.
+    pub what: String,
+    /// Why it is not needed.
+    pub why: String,
+}
+
+/// A checked scene; made by [`SceneBuilder::finish`], immutable after it.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Triangle meshes, object space.
+    pub meshes: Vec<Mesh>,
+    /// Where they are.
+    pub instances: Vec<Instance>,
+    /// Surface descriptions.
+    pub materials: Vec<Material>,
+    /// Image + sampler pairs.
+    pub textures: Vec<Texture>,
+    /// Decoded pixels.
+    pub images: Vec<Image>,
+    /// Punctual lights.
+    pub lights: Vec<PlacedLight>,
+    /// Cameras with their place.
+    pub cameras: Vec<Camera>,
+    /// Which scene of the file this is.
+    pub index: usize,
+    /// Said to the user and written into the JSON.
+    pub warnings: Vec<String>,
+    /// Parts of the file that were not needed.
+    pub skipped: Vec<Skipped>,
+}
+
+impl Scene {
+    /// Triangles after placing every instance.
+    pub fn triangle_count(&self) -> usize {
+        self.instances.iter().map(|i| self.meshes[i.mesh.index()].indices.len()).sum()
+    }
+}
