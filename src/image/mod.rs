@@ -1,1 +1,6 @@
-//! (to come)
+//! Picture files: EXR and PNG out (always to memory first: [`crate::batch`] puts bytes on disk), EXR in.
+
+pub mod exr;
+mod exr_header;
+pub mod exr_read;
+pub mod png;
