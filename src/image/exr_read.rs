@@ -93,11 +93,15 @@ mod tests {
 
     fn written(names: [&'static str; 3]) -> Vec<u8> {
         let channel = |name: &'static str, samples| AnyChannel::new(name, samples);
-        let channels = AnyChannels::sort([
-            channel(names[0], FlatSamples::F16(vec![f16::from_f32(0.5); 6])),
-            channel(names[1], FlatSamples::F32((0..6).map(|i| i as f32).collect())),
-            channel(names[2], FlatSamples::U32(vec![3; 6])),
-        ].into_iter().collect());
+        let channels = AnyChannels::sort(
+            [
+                channel(names[0], FlatSamples::F16(vec![f16::from_f32(0.5); 6])),
+                channel(names[1], FlatSamples::F32((0..6).map(|i| i as f32).collect())),
+                channel(names[2], FlatSamples::U32(vec![3; 6])),
+            ]
+            .into_iter()
+            .collect(),
+        );
         let layer = Layer::new((3, 2), LayerAttributes::default(), Encoding::SMALL_FAST_LOSSLESS, channels);
         let mut bytes = Cursor::new(Vec::new());
         Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
