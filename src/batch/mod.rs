@@ -13,4 +13,4 @@ pub mod report;
 mod run;
 
 pub use picture::FileOptions;
-pub use run::{BatchSettings, Observer, Outcome, Stop, run};
+pub use run::{BatchSettings, MAX_SIDE, Observer, Outcome, PictureSize, Stop, run};
