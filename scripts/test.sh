@@ -69,7 +69,7 @@ else
         cat "$work/info" >&2
         exit 1
       fi
-      if ! grep -Eq 'Stats NanCount: (0 ?)+' "$work/info" || ! grep -Eq 'Stats InfCount: (0 ?)+' "$work/info"; then
+      if ! grep -Eq 'Stats NanCount: (0 *)+$' "$work/info" || ! grep -Eq 'Stats InfCount: (0 *)+$' "$work/info"; then
         echo "error: $picture holds pixels that are not finite:" >&2
         grep -E 'Nan|Inf' "$work/info" >&2
         exit 1

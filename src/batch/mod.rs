@@ -11,6 +11,8 @@ mod peek;
 mod picture;
 pub mod report;
 mod run;
+mod size;
 
 pub use picture::FileOptions;
-pub use run::{BatchSettings, MAX_SIDE, Observer, Outcome, PictureSize, Stop, run};
+pub use run::{BatchSettings, Observer, Outcome, Stop, run};
+pub use size::{MAX_SIDE, PictureSize};

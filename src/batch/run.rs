@@ -6,23 +6,14 @@ use super::names::NameTemplate;
 use super::output::{WriteError, check_writable, write_atomic};
 use super::picture::{FileOptions, exr_bytes, png_bytes};
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Rays, Seconds, Status};
-use crate::camera::Projection;
+use super::size::{PictureSize, check_crop, size_for};
 use crate::load::{LoadOptions, LoadTimes, load};
-use crate::render::{AccelChoice, CropWindow, Frame, Progress, RenderSettings, render};
+use crate::render::{AccelChoice, Frame, Progress, RenderSettings, render};
 use crate::scene::Scene;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
-
-/// Size of the pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PictureSize {
-    /// This wide; the height follows from the camera's aspect ratio, else 16:9.
-    Width(u32),
-    /// Exactly this, whatever the camera says.
-    Exact(u32, u32),
-}
 
 /// What to do.
 #[derive(Clone, Debug)]
@@ -368,32 +359,6 @@ fn describe(frame: &Frame, settings: &RenderSettings, image: &mut ImageReport) {
         let first = format!("the first at pixel ({x}, {y}), sample {sample}, seed {seed}");
         image.warnings.push(format!("{count} samples were not finite and were dropped; {first}"));
     }
-}
-
-/// Width and height of the picture of `camera`.
-fn size_for(size: PictureSize, scene: &Scene, camera: usize) -> (u32, u32) {
-    match size {
-        PictureSize::Exact(width, height) => (width, height),
-        PictureSize::Width(width) => {
-            let aspect = scene.cameras.get(camera).and_then(|camera| match camera.projection {
-                Projection::Perspective { aspect_ratio, .. } => aspect_ratio,
-            });
-            let height = f64::from(width) / aspect.unwrap_or(16.0 / 9.0);
-            (width, (height.round() as u32).clamp(1, MAX_SIDE))
-        }
-    }
-}
-
-/// Most pixels along one side.
-pub const MAX_SIDE: u32 = 65_536;
-
-fn check_crop(crop: CropWindow, width: u32, height: u32) -> Result<(), String> {
-    let inside = |start: u32, size: u32, whole: u32| u64::from(start) + u64::from(size) <= u64::from(whole);
-    if inside(crop.x, crop.width, width) && inside(crop.y, crop.height, height) {
-        return Ok(());
-    }
-    let CropWindow { x, y, width: w, height: h } = crop;
-    Err(format!("--crop {x},{y},{w},{h} is not inside the picture of {width} x {height} pixels"))
 }
 
 fn accel_name(accel: AccelChoice) -> &'static str {

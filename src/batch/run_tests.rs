@@ -1,8 +1,7 @@
 //! Tests of the engine that need no renderer.
 
 use super::*;
-use crate::camera::Camera;
-use crate::render::{FrameCamera, RenderStats};
+use crate::render::{CropWindow, FrameCamera, RenderStats};
 
 struct Silent;
 impl Observer for Silent {}
@@ -101,25 +100,4 @@ fn bad_inputs_are_reported_and_the_exit_code_is_3() {
     assert_eq!((outcome.exit_code(), outcome.bad_inputs), (3, 2));
     assert!(out.join("broken.json").is_file() && out.join("batch.json").is_file());
     assert!(!out.join("*.json").exists());
-}
-
-#[test]
-fn size_follows_the_cameras_aspect_ratio() {
-    let camera = |aspect_ratio| Camera {
-        name: String::new(),
-        world_from_camera: glam::DMat4::IDENTITY,
-        projection: Projection::Perspective { yfov: 1.0, aspect_ratio },
-    };
-    let scene = Scene { cameras: vec![camera(Some(2.0)), camera(None)], ..Scene::default() };
-    let size = PictureSize::Width(1280);
-    assert_eq!([0, 1, 2].map(|i| size_for(size, &scene, i)), [(1280, 640), (1280, 720), (1280, 720)]);
-    assert_eq!(size_for(PictureSize::Exact(3, 5), &scene, 0), (3, 5));
-}
-
-#[test]
-fn a_crop_must_be_inside() {
-    let crop = |x, y, width, height| check_crop(CropWindow { x, y, width, height }, 64, 32);
-    assert!(crop(0, 0, 64, 32).is_ok());
-    assert!(crop(60, 0, 5, 1).unwrap_err().contains("--crop 60,0,5,1 is not inside the picture of 64 x 32"));
-    assert!(crop(0, u32::MAX, 1, u32::MAX).is_err());
 }

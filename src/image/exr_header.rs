@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn attributes_are_sorted_and_the_rest_is_kept() {
-        let (a, ab, b) = (attribute("a", b"zzzz"), attribute("ab", b"1\02"), attribute("b", b""));
+        let (a, ab, b) = (attribute("a", b"zzzz"), attribute("ab", b"1\x002"), attribute("b", b""));
         let preamble = [1, 2, 3, 4, 5, 6, 7, 8].as_slice();
         let mut file = [preamble, &b, &ab, &a, b"\0pixels"].concat();
         sort_attributes(&mut file).unwrap();

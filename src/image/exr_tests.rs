@@ -126,7 +126,9 @@ fn stored_matrices_take_a_known_point_to_camera_and_picture() {
     // 5 m in front of the camera, 0.5 m right, 0.25 m up, in the file's frame (looking along -Z).
     let world = picture.camera.world_from_camera.transform_point3(DVec3::new(0.5, 0.25, -5.0));
     let [x, y, z, w] = transform(world, &to_camera);
-    (near(x, 0.5), near(y, 0.25), near(z, 5.0), near(w, 1.0));
+    for (value, expected) in [(x, 0.5), (y, 0.25), (z, 5.0), (w, 1.0)] {
+        near(value, expected);
+    }
 
     let half_height = 5.0 * (0.5 * 0.7_f64).tan();
     let half_width = half_height * 16.0 / 9.0;
@@ -138,7 +140,9 @@ fn stored_matrices_take_a_known_point_to_camera_and_picture() {
         (corner(0.0, 0.0), (0.5, 0.5)),
     ] {
         let [x, y, z, w] = transform(point, &to_ndc);
-        (near(x / w, expected.0), near(y / w, expected.1), near(w, 5.0));
+        for (value, expected) in [(x / w, expected.0), (y / w, expected.1), (w, 5.0)] {
+            near(value, expected);
+        }
         assert!((0.0..1.0).contains(&(z / w)));
     }
 }

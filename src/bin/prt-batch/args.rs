@@ -53,13 +53,13 @@ pub struct RenderArgs {
     pub name: Option<NameTemplate>,
 
     /// Pixels, such as 1280x720
-    #[arg(long, value_name = "WxH", value_parser = parse::size, conflicts_with = "width")]
+    #[arg(long, value_name = "WxH", value_parser = parse::size, allow_hyphen_values = true, conflicts_with = "width")]
     pub size: Option<(u32, u32)>,
     /// Pixels across; the height follows from the camera's aspect ratio, else 16:9 [default: 1280]
     #[arg(long, value_name = "W", value_parser = parse::width)]
     pub width: Option<u32>,
     /// Render that window only, origin top left, y down; its pixels equal those of the whole picture
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, allow_hyphen_values = true)]
     pub crop: Option<CropWindow>,
     /// Which cameras: all, an index or a name
     #[arg(long, value_name = "CAMERA", default_value = "all", value_parser = parse::camera)]

@@ -46,15 +46,22 @@ const COMMANDS: &[&str] = &["bench", "verify", "retone", "doctor"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {
-    let command = with_options(command).mut_subcommand("render", with_options);
+    let command = with_options(command).mut_subcommand("render", with_options).mut_subcommand("compare", negatives);
     command.subcommands(COMMANDS.iter().map(|name| {
         let anything = Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true);
         Command::new(*name).hide(true).disable_help_flag(true).arg(anything)
     }))
 }
 
+/// Lets negative numbers through to the options' own checks, whose messages name the option.
+fn negatives(command: Command) -> Command {
+    command.mut_args(|arg| {
+        if arg.get_long().is_some() && arg.get_action().takes_values() { arg.allow_negative_numbers(true) } else { arg }
+    })
+}
+
 fn with_options(command: Command) -> Command {
-    command.args(OPTIONS.iter().map(|&(name, takes_value)| {
+    negatives(command).args(OPTIONS.iter().map(|&(name, takes_value)| {
         let arg = Arg::new(name).long(name).hide(true);
         if takes_value {
             arg.num_args(0..=1).allow_hyphen_values(true).action(ArgAction::Append)

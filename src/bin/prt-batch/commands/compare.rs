@@ -169,10 +169,10 @@ fn check(path: &Path, metrics: &Metrics, args: &CompareArgs, failures: &mut Vec<
     }
     for (channel, ratio) in ["R", "G", "B"].iter().zip(metrics.mean_ratio) {
         let bias = ratio.map(|ratio| 100.0 * (ratio - 1.0));
-        if let (Some(bias), Some(limit)) = (bias, args.max_bias) {
-            if bias.abs() > limit {
-                failures.push(format!("{path}: mean of {channel} is off by {bias:+.4} %, beyond --max-bias {limit}"));
-            }
+        if let (Some(bias), Some(limit)) = (bias, args.max_bias)
+            && bias.abs() > limit
+        {
+            failures.push(format!("{path}: mean of {channel} is off by {bias:+.4} %, beyond --max-bias {limit}"));
         }
     }
 }
