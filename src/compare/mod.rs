@@ -1,4 +1,4 @@
-//! Pictures against a reference: error metrics ([`metrics`]), a test of equality that knows about noise ([`blocks`])
+//! Pictures against a reference: error metrics ([`mod@metrics`]), a test of equality that knows about noise ([`blocks`])
 //! and the distributions it needs ([`stats`]).
 
 pub mod blocks;
