@@ -1,5 +1,7 @@
 //! Materials as described by the file, in glTF's names.
 
+pub mod bsdf;
+
 use crate::texture::Param;
 
 /// Metallic-roughness parameters with `KHR_materials_specular` and `KHR_materials_emissive_strength`.
