@@ -3,6 +3,7 @@
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{NonNull, null_mut};
+use std::sync::atomic::{AtomicIsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, ErrorCode, Version};
@@ -22,6 +23,8 @@ pub struct Device {
     library: Arc<Library>,
     config: String,
     native_width: usize,
+    /// Bytes that Embree holds. Shared because Embree has its address.
+    memory: Arc<AtomicIsize>,
     /// Held while a call changes the device itself, which Embree does not allow from two threads.
     building: Mutex<()>,
 }
@@ -60,10 +63,14 @@ impl Device {
             library: Arc::clone(library),
             config: config.to_owned(),
             native_width: 4,
+            memory: Arc::new(AtomicIsize::new(0)),
             building: Mutex::new(()),
         };
-        // SAFETY: the handle is valid; the callback needs no user pointer and never unwinds.
+        let memory = Arc::as_ptr(&device.memory).cast_mut().cast();
+        // SAFETY: the handle is valid; the callbacks never unwind; the first needs no user pointer, the
+        // second's is to a counter that is dropped after the handle is released.
         unsafe {
+            (device.api().set_device_memory_monitor_function)(device.handle(), Some(count_memory), memory);
             (device.api().set_device_error_function)(device.handle(), Some(keep_message), null_mut());
         }
         if device.property(property::NATIVE_RAY16_SUPPORTED) != 0 {
@@ -88,6 +95,11 @@ impl Device {
     /// The configuration that the device was made with.
     pub fn config(&self) -> &str {
         &self.config
+    }
+
+    /// Bytes that Embree has allocated for all scenes of this device: trees, not the arrays that geometries own.
+    pub fn memory_bytes(&self) -> usize {
+        usize::try_from(self.memory.load(Ordering::Relaxed)).unwrap_or(0)
     }
 
     /// How many rays the widest packet holds that runs as one on this device: 4, 8 or 16.
@@ -195,4 +207,12 @@ unsafe extern "C" fn keep_message(_user: *mut c_void, _code: c_int, text: *const
             *last = message;
         }
     });
+}
+
+/// Embree's memory monitor: `bytes` more, or fewer if negative. `true` lets it go on.
+unsafe extern "C" fn count_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
+    // SAFETY: `user` is the device's counter, which outlives the device handle.
+    let memory = unsafe { &*user.cast::<AtomicIsize>() };
+    memory.fetch_add(bytes, Ordering::Relaxed);
+    true
 }

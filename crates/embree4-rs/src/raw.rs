@@ -64,6 +64,9 @@ const FEATURE_ALL: u32 = u32::MAX;
 /// `RTCErrorFunction`.
 pub(crate) type ErrorFunction = unsafe extern "C" fn(*mut c_void, c_int, *const c_char);
 
+/// `RTCMemoryMonitorFunction`.
+pub(crate) type MemoryFunction = unsafe extern "C" fn(*mut c_void, isize, bool) -> bool;
+
 /// `RTCBounds`: an axis-aligned box, each corner padded to 16 bytes.
 #[repr(C, align(16))]
 #[derive(Default)]
@@ -184,6 +187,8 @@ function_table! {
     Api
     required {
         set_device_error_function = "rtcSetDeviceErrorFunction": fn(*mut RtcDevice, Option<ErrorFunction>, *mut c_void);
+        set_device_memory_monitor_function = "rtcSetDeviceMemoryMonitorFunction":
+            fn(*mut RtcDevice, Option<MemoryFunction>, *mut c_void);
 
         new_geometry = "rtcNewGeometry": fn(*mut RtcDevice, c_int) -> *mut RtcGeometry;
         release_geometry = "rtcReleaseGeometry": fn(*mut RtcGeometry);

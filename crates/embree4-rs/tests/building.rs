@@ -128,6 +128,18 @@ fn subnormal_numbers_survive_building_and_tracing() {
 }
 
 #[test]
+fn the_device_counts_the_bytes_of_its_scenes() {
+    let Some(device) = device("threads=1") else { return };
+    let before = device.memory_bytes();
+    let scene = scene_of(&device, [square(0.0, 64)]);
+    let bytes = device.memory_bytes() - before;
+    let triangles = 2 * 64 * 64;
+    assert!((20 * triangles..500 * triangles).contains(&bytes), "{bytes} bytes for {triangles} triangles");
+    drop(scene);
+    assert!(device.memory_bytes() < before + bytes / 2, "{} bytes are left", device.memory_bytes());
+}
+
+#[test]
 fn scenes_travel_between_threads() {
     fn assert_send_sync<T: Send + Sync>() {}
     assert_send_sync::<CommittedScene>();
