@@ -99,7 +99,11 @@ impl CommittedScene {
     ///
     /// A ray with a NaN or infinite origin or direction, or with a `t_max` that is NaN or negative,
     /// is a miss. `coherent` says that neighbours in the slices go much the same way, as camera rays
-    /// in pixel order do; wrong is slow, not incorrect. Results do not depend on where in the slices a ray is.
+    /// in pixel order do; wrong is slow, not incorrect.
+    ///
+    /// Where two triangles are hit at the same distance, such as on a shared edge, which one is reported
+    /// can depend on the other rays of the packet, on `coherent` and on the device's instruction set: equal
+    /// batches give equal results, the same ray in another batch may not.
     ///
     /// Panics when the slices' lengths differ.
     pub fn intersect_batch(&self, rays: RaysSoA<'_>, coherent: bool, hits: HitsSoAMut<'_>) {

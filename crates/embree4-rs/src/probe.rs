@@ -4,6 +4,8 @@
 //! `instPrimID` (when built with instance arrays), and every further instance level makes two arrays
 //! longer. The version number does not tell. So each query is run once on a known triangle, in a buffer full of
 //! sentinel words, and every word of the buffer is compared with what a known layout leaves there.
+//!
+//! A second instance level cannot be seen without instances: when scenes get them, so must the probe.
 
 use std::mem::size_of;
 use std::ptr::null_mut;

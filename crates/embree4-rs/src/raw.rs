@@ -33,11 +33,12 @@ pub(crate) const INVALID_ID: u32 = u32::MAX;
 
 /// `RTCDeviceProperty` values.
 pub(crate) mod property {
+    use std::ffi::c_int;
+
     pub(crate) const VERSION: c_int = 0;
     pub(crate) const NATIVE_RAY8_SUPPORTED: c_int = 33;
     pub(crate) const NATIVE_RAY16_SUPPORTED: c_int = 34;
     pub(crate) const TRIANGLE_GEOMETRY_SUPPORTED: c_int = 96;
-    use std::ffi::c_int;
 }
 
 /// `RTCSceneFlags` bits.
