@@ -4,7 +4,7 @@ import random
 
 from .gltf_file import GltfFile
 from .rooms import FLAT, flat_panel
-from .shapes import arc, block, box, extruded, icosphere, lathe, sphere, torus, tube
+from .shapes import block, extruded, icosphere, lathe, sphere, torus, tube
 from .vector import turn
 
 
@@ -12,8 +12,8 @@ def lights():
     """A hall with 128 small glowing balls on strings and 72 point lights just above its floor."""
     g = GltfFile("lights")
     rng = random.Random(200)
-    paint = g.matte("paint", (0.55, 0.53, 0.50))
-    floor = g.material("floor", (0.42, 0.41, 0.40), roughness=0.35)
+    paint = g.matte("paint", (0.30, 0.32, 0.42))
+    floor = g.material("floor", (0.46, 0.45, 0.44), roughness=0.4)
     dark = g.matte("cable", (0.04, 0.04, 0.04))
     colors = {"warm": (1.0, 0.62, 0.26), "amber": (1.0, 0.42, 0.08), "rose": (1.0, 0.22, 0.3), "white": (1.0, 0.92, 0.8), "aqua": (0.2, 0.8, 0.9), "blue": (0.22, 0.4, 1.0)}
 
@@ -32,7 +32,7 @@ def lights():
     small, fine = g.geometry(icosphere(1.0, 0), "u8"), g.geometry(icosphere(1.0, 1), "u8")
     bulbs = []
     for name, color in colors.items():
-        for level, nits in (("dim", 6.0), ("bright", 16.0)):
+        for level, nits in (("dim", 16.0), ("bright", 40.0)):
             glow = g.lamp(f"{name} {level}", tuple(nits * c for c in color))
             bulbs.append(g.mesh(f"bulb {name} {level}", (fine if level == "bright" else small, glow)))
 
@@ -54,7 +54,7 @@ def lights():
             hue = (i / 12 + 0.07 * j) % 1.0
             color = tuple(0.12 + 0.88 * (0.5 + 0.5 * math.cos(2 * math.pi * (hue - k / 3))) ** 1.5 for k in range(3))
             x, z = -2.95 + j * 1.18, back + 0.4 + i * 0.6
-            g.light(f"point {i + 1}.{j + 1}", "point", 0.012 + 0.04 * rng.random(), color, at=(x + 0.2 * (i % 2), 0.1 + 0.1 * rng.random(), z))
+            g.light(f"point {i + 1}.{j + 1}", "point", 0.04 + 0.11 * rng.random(), color, at=(x + 0.2 * (i % 2), 0.1 + 0.1 * rng.random(), z))
 
     porcelain = g.material("porcelain", (0.75, 0.74, 0.72), roughness=0.12)
     gold = g.material("gold", (1.0, 0.77, 0.34), metallic=1.0, roughness=0.2)
@@ -62,7 +62,7 @@ def lights():
     ball_geometry = g.geometry(ball, "u16", "interleaved")
     g.node("porcelain ball", g.mesh("porcelain ball", (ball_geometry, porcelain)), at=(-1.15, 0.55, -1.1), size=0.55)
     g.node("gold ball", g.mesh("gold ball", (ball_geometry, gold)), at=(1.5, 0.42, -0.25), size=0.42)
-    put("ring", torus(0.55, 0.16, 64, 24).without("uvs", "tangents"), porcelain, "u16", "padded", at=(0.55, 0.64, -2.4), turn=turn((1, 0.3, 0), 74))
+    put("ring", torus(0.55, 0.16, 64, 24).without("uvs", "tangents"), porcelain, "u16", "padded", at=(0.5, 0.68, -2.65), turn=turn((1, 0.3, 0), 74))
     column = g.mesh("column", (g.geometry(block((-0.5, 0, -0.5), (0.5, 1, 0.5)), "u8"), paint))
     for name, x, z, tall in (("column left", -2.5, -3.2, 1.9), ("column right", 2.5, -3.0, 1.5), ("block", -2.4, 0.4, 0.5)):
         # One matrix per column: scale, then a turn about Y, then a place.
@@ -89,14 +89,14 @@ def punctual():
     profile += [(-0.6 - math.sin(math.radians(a)), 1 - math.cos(math.radians(a))) for a in range(5, 90, 5)] + [(-1.6, 1.0), (-1.6, 2.6), (-1.6, 4.5)]
     put("sweep", extruded(profile, 12.0), paper, "u8", "padded")
     put("ball", sphere(0.42, 64), red, at=(-0.95, 0.42, 0.1))
-    cone = lathe([[(0, 0), (0.4, 0)], [(0.4, 0), (0.3, 0.26), (0.2, 0.52), (0.1, 0.78), (0.02, 0.988)], arc((0, 0.983), 0.0206, 14, 90, 4)], 64)
+    cone = lathe([[(0, 0), (0.4, 0)], [(0.4, 0), (0.3, 0.26), (0.2, 0.52), (0.1, 0.78), (0.02, 0.988), (0.012, 1.0), (0, 1.004)]], 64)
     put("cone", cone, cream, at=(0.12, 0, -0.35))
     put("box", block((-0.26, 0, -0.26), (0.26, 0.52, 0.26)), teal, "u8", at=(0.98, 0, 0.1), turn=turn((0, 1, 0), 28))
     put("ring", torus(0.27, 0.085, 72, 28), brass, "u16", at=(0.98, 0.605, 0.1))
     put("small ball", sphere(0.14, 48), cream, layout="padded", at=(-0.22, 0.14, 0.72))
-    g.light("soft warm spot", "spot", 72.0, (1.0, 0.8, 0.55), at=(-2.4, 3.4, 2.4), target=(-0.5, 0.3, 0.0), spot=(6, 17))
-    g.light("hard blue spot", "spot", 34.0, (0.35, 0.55, 1.0), at=(2.6, 2.9, 1.9), target=(0.75, 0.35, -0.1), spot=(12.0, 12.5))
-    g.light("point lamp", "point", 1.5, (1.0, 0.72, 0.42), at=(0.35, 0.75, 0.95))
-    g.light("moon", "directional", 0.42, (0.75, 0.85, 1.0), at=(0.0, 4.0, 3.0), target=(0.9, 0.0, -0.4))
+    g.light("soft warm spot", "spot", 85.0, (1.0, 0.8, 0.55), at=(-2.4, 3.4, 2.4), target=(-0.5, 0.3, 0.0), spot=(6, 17))
+    g.light("hard blue spot", "spot", 52.0, (0.35, 0.55, 1.0), at=(2.6, 2.9, 1.9), target=(0.75, 0.35, -0.1), spot=(12.0, 12.5))
+    g.light("point lamp", "point", 2.4, (1.0, 0.72, 0.42), at=(0.35, 0.75, 0.95))
+    g.light("moon", "directional", 0.75, (0.75, 0.85, 1.0), at=(0.0, 4.0, 3.0), target=(0.9, 0.0, -0.4))
     g.camera("camera", (0.25, 1.35, 4.1), (0.0, 0.5, 0), 32)
     return g

@@ -1,6 +1,4 @@
 """Example scenes with materials as their subject: spheres of metal, and a still life."""
-import math
-
 from .gltf_file import GltfFile
 from .pictures import cloth, lantern, peel, planks, tiles
 from .rooms import flat_panel
@@ -11,7 +9,7 @@ from .vector import turn
 def metals():
     """Four steps of six spheres: gold, copper, iron, blue plastic; roughness 0.05 to 1 from left to right."""
     g = GltfFile("metals")
-    step = g.matte("step", (0.30, 0.30, 0.31))
+    step = g.matte("step", (0.42, 0.42, 0.43))
     stone = g.material("stone tiles", roughness=0.3, base=g.texture("tiles_color", tiles()))
     wall = g.matte("wall", (0.34, 0.34, 0.36))
     # Base colours of metals: linear F0 of gold, copper and iron; the last row is a dielectric.
@@ -39,10 +37,10 @@ def metals():
     put("right wall", flat_panel((w, 0, back), (0, 0, depth), (0, h, 0)), wall)
     put("ceiling", flat_panel((-w, h, back), (2 * w, 0, 0), (0, 0, depth)), wall)
     # Softboxes hang 5 cm in front of walls and ceiling.
-    put("softbox above", flat_panel((-1.3, h - 0.05, -0.6), (2.6, 0, 0), (0, 0, 1.5)), g.lamp("softbox above", (5.6, 5.4, 5.0)))
-    put("softbox left", flat_panel((-w + 0.05, 0.3, 2.2), (0, 0, -2.2), (0, 2.5, 0)), g.lamp("softbox left", (4.6, 3.9, 3.0)))
-    put("softbox right", flat_panel((w - 0.05, 0.6, 0.2), (0, 0, 0.9), (0, 2.2, 0)), g.lamp("softbox right", (2.8, 3.6, 4.8)))
-    put("softbox behind camera", flat_panel((1.5, 1.9, front - 0.05), (-3.0, 0, 0), (0, 1.1, 0)), g.lamp("softbox behind camera", (1.6, 1.6, 1.6)))
+    put("softbox above", flat_panel((-1.3, h - 0.05, -0.6), (2.6, 0, 0), (0, 0, 1.5)), g.lamp("softbox above", (9.5, 9.2, 8.5)))
+    put("softbox left", flat_panel((-w + 0.05, 0.3, 2.2), (0, 0, -2.2), (0, 2.5, 0)), g.lamp("softbox left", (8.0, 6.8, 5.2)))
+    put("softbox right", flat_panel((w - 0.05, 0.6, 0.2), (0, 0, 0.9), (0, 2.2, 0)), g.lamp("softbox right", (5.0, 6.4, 8.5)))
+    put("softbox behind camera", flat_panel((1.5, 1.9, front - 0.05), (-3.0, 0, 0), (0, 1.1, 0)), g.lamp("softbox behind camera", (3.0, 3.0, 3.0)))
     g.camera("camera", (0.0, 2.05, 4.1), (0.0, 0.56, 0), 29)
     return g
 
@@ -53,7 +51,7 @@ def stilllife():
     wood = g.material("table top", roughness=0.38, base=g.texture("wood_color", planks(256, 5, 17, (0.12, 0.05, 0.02), (0.36, 0.18, 0.075))))
     check = g.matte("cloth", (1.0, 1.0, 1.0), base=g.texture("cloth_color", cloth()))
     orange = g.material("orange peel", (0.86, 0.29, 0.02), roughness=0.42, normal=g.texture("peel_normal", peel()))
-    paper = g.material("paper lantern", (0.5, 0.45, 0.35), specular=0.0, emission=(4.5, 4.5, 4.5), emissive=g.texture("lantern_glow", lantern()))
+    paper = g.material("paper lantern", (0.5, 0.45, 0.35), specular=0.0, emission=(6.0, 6.0, 6.0), emissive=g.texture("lantern_glow", lantern()))
     glaze = g.material("blue glaze", (0.08, 0.16, 0.32), roughness=0.16)
     bottle_glass = g.material("dark bottle", (0.015, 0.05, 0.03), roughness=0.06)
     cork = g.matte("cork", (0.45, 0.29, 0.16))
@@ -62,7 +60,7 @@ def stilllife():
     linen = g.material("book cover", (0.11, 0.2, 0.16), roughness=0.75)
     pages = g.matte("pages", (0.72, 0.67, 0.55))
     wall = g.matte("wall", (0.44, 0.40, 0.36))
-    window = g.lamp("window", (6.4, 6.8, 7.4))
+    window = g.lamp("window", (15.0, 16.0, 17.5))
 
     def put(name, shape, material, index="u16", layout="planar", **where):
         return g.node(name, g.mesh(name, (g.geometry(shape, index, layout), material)), **where)
@@ -86,15 +84,15 @@ def stilllife():
         smooth_run([(0.058, 0.012), (0.11, 0.04), (0.15, 0.09), (0.158, 0.115)], 8), arc((0.154, 0.115), 0.004, 0, 180, 6),
         smooth_run([(0.15, 0.115), (0.142, 0.09), (0.1, 0.046), (0.05, 0.022), (0.0, 0.018)], 8),
     ], 72).without("uvs", "tangents")
-    put("bowl", bowl, glaze, layout="interleaved", parent=table, at=(-0.14, 0.004, 0.05))
+    put("bowl", bowl, glaze, layout="interleaved", parent=table, at=(-0.14, 0.003, 0.05))
     fruit = g.mesh("orange", (g.geometry(sphere(1.0, 48, (6, 3)), "u16", "interleaved"), orange))
-    for name, at, r, lean in (("orange 1", (-0.205, 0.085, 0.075), 0.056, 20), ("orange 2", (-0.082, 0.083, 0.075), 0.054, -35), ("orange 3", (-0.145, 0.092, -0.025), 0.055, 70), ("orange 4", (0.16, 0.055, 0.26), 0.055, 110)):
+    for name, at, r, lean in (("orange 1", (-0.205, 0.1, 0.075), 0.056, 20), ("orange 2", (-0.082, 0.098, 0.075), 0.054, -35), ("orange 3", (-0.145, 0.1, -0.025), 0.055, 70), ("orange 4", (0.16, 0.055, 0.26), 0.055, 110)):
         g.node(name, fruit, at=at, turn=turn((1, 0.2, 0.6), lean), size=r, parent=table)
     apple = lathe([smooth_run([(0, 0.016), (0.014, 0.006), (0.032, 0.002), (0.05, 0.02), (0.058, 0.052), (0.05, 0.086), (0.03, 0.099), (0.012, 0.09), (0, 0.078)], 8)], 64).without("uvs", "tangents")
     put("apple", apple, apple_skin, layout="padded", parent=table, at=(0.055, 0.0, 0.17))
     bottle = lathe([
         [(0, 0), (0.048, 0)], smooth_run([(0.048, 0), (0.052, 0.006), (0.053, 0.02), (0.053, 0.17), (0.05, 0.2), (0.03, 0.235), (0.018, 0.26), (0.0165, 0.33)], 6),
-        [(0.0165, 0.33), (0.02, 0.332), (0.02, 0.344), (0.0165, 0.346)], [(0.0165, 0.346), (0.012, 0.346)],
+        [(0.0165, 0.33), (0.02, 0.331)], [(0.02, 0.331), (0.02, 0.345)], [(0.02, 0.345), (0.012, 0.345)],
     ], 64).without("uvs", "tangents")
     put("bottle", bottle, bottle_glass, parent=table, at=(-0.37, 0, -0.14))
     put("cork", lathe([[(0.0118, 0.335), (0.0125, 0.362)], [(0.0125, 0.362), (0, 0.362)]], 32).without("uvs", "tangents"), cork, "u8", parent=table, at=(-0.37, 0, -0.14))

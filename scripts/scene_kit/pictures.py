@@ -101,7 +101,7 @@ def bricks(size=512, across=4, courses=12, seed=11):
             mixed = [m + (k - m) * inside for m, k in zip(lime, clay)]
             # Steps of 1/24: coarse enough to compress, finer than the eye sees under the relief.
             colors += bytes(tone(mixed, round(level * 24) / 24))
-            roughs += bytes((255, 16 * round((0.92 - 0.22 * inside * value) * 15.9), 0))
+            roughs += bytes((255, 4 * round((0.92 - 0.22 * inside * value - 0.06 * c) * 63), 0))
         base.append(bytes(colors))
         rough.append(bytes(roughs))
         height.append(heights)

@@ -3,7 +3,7 @@ import math
 
 from .gltf_file import GltfFile
 from .pictures import bricks, glaze, planks
-from .shapes import arc, block, box, holed_panel, joined, lathe, panel, smooth_run, torus_knot
+from .shapes import block, holed_panel, joined, lathe, panel, smooth_run, torus_knot
 from .vector import turn
 
 FLAT = ("normals", "uvs", "tangents")
@@ -19,17 +19,17 @@ def cornell():
     white = g.matte("white", (0.73, 0.73, 0.73))
     red = g.matte("red", (0.65, 0.05, 0.05))
     green = g.matte("green", (0.12, 0.45, 0.15))
-    lamp = g.lamp("lamp", (17.0, 14.0, 9.6))
+    lamp = g.lamp("lamp", (34.0, 28.0, 19.5))
 
     def put(name, shape, material, **where):
         return g.node(name, g.mesh(name, (g.geometry(shape, "u8"), material)), **where)
 
     put("floor", flat_panel((-1, 0, 1), (2, 0, 0), (0, 0, -2)), white)
-    put("ceiling", holed_panel((-1, 2, -1), (2, 0, 0), (0, 0, 2), (0.375, 0.625, 0.4, 0.6)), white)
+    put("ceiling", holed_panel((-1, 2, -1), (2, 0, 0), (0, 0, 2), (0.35, 0.65, 0.375, 0.625)), white)
     put("back wall", flat_panel((-1, 0, -1), (2, 0, 0), (0, 2, 0)), white)
     put("left wall", flat_panel((-1, 0, 1), (0, 0, -2), (0, 2, 0)), red)
     put("right wall", flat_panel((1, 0, -1), (0, 0, 2), (0, 2, 0)), green)
-    put("lamp", flat_panel((-0.25, 2, -0.2), (0.5, 0, 0), (0, 0, 0.4)), lamp)
+    put("lamp", flat_panel((-0.3, 2, -0.25), (0.6, 0, 0), (0, 0, 0.5)), lamp)
     # Both boxes are one mesh, told apart by their nodes.
     cube = g.mesh("box", (g.geometry(block((-0.5, 0, -0.5), (0.5, 1, 0.5)), "u8"), white))
     boxes = g.node("boxes")
@@ -47,7 +47,7 @@ def wall():
     floor = g.material("planks", roughness=0.42, base=g.texture("planks_color", planks()))
     plaster = g.matte("plaster", (0.66, 0.63, 0.58))
     sky = g.lamp("daylight", (21.0, 23.5, 27.0))
-    bulb = g.lamp("warm ceiling light", (8.0, 6.0, 3.6))
+    bulb = g.lamp("warm ceiling light", (5.0, 3.8, 2.3))
     stone = g.material("limestone", (0.55, 0.52, 0.46), roughness=0.7)
     clay = g.material("terracotta", (0.52, 0.2, 0.1), roughness=0.65)
 
@@ -97,9 +97,10 @@ def knot():
     g = GltfFile("knot")
     glazed = g.material("glazed ceramic", roughness=0.24, base=g.texture("glaze_color", glaze()))
     wall_paint = g.matte("wall paint", (0.52, 0.55, 0.58))
+    back_paint = g.matte("back wall paint", (0.40, 0.27, 0.19))
     concrete = g.material("concrete", (0.40, 0.38, 0.36), roughness=0.55)
     plinth = g.matte("plinth", (0.72, 0.7, 0.67))
-    lamp = g.lamp("ceiling lamp", (9.0, 8.4, 7.4))
+    lamp = g.lamp("ceiling lamp", (10.5, 9.8, 8.6))
     window = g.lamp("window", (5.2, 6.0, 7.0))
 
     def put(name, shape, material):
@@ -110,12 +111,12 @@ def knot():
     put("floor", flat_panel((-w, 0, front), (2 * w, 0, 0), (0, 0, -depth)), concrete)
     put("ceiling", holed_panel((-w, h, back), (2 * w, 0, 0), (0, 0, depth), (0.3, 0.7, 0.35, 0.6)), wall_paint)
     put("ceiling lamp", flat_panel((-w + 0.3 * 2 * w, h, back + 0.35 * depth), (0.4 * 2 * w, 0, 0), (0, 0, 0.25 * depth)), lamp)
-    put("back wall", flat_panel((-w, 0, back), (2 * w, 0, 0), (0, h, 0)), wall_paint)
+    put("back wall", flat_panel((-w, 0, back), (2 * w, 0, 0), (0, h, 0)), back_paint)
     put("front wall", flat_panel((w, 0, front), (-2 * w, 0, 0), (0, h, 0)), wall_paint)
     put("left wall", holed_panel((-w, 0, front), (0, 0, -depth), (0, h, 0), (0.3, 0.55, 0.2, 0.85)), wall_paint)
     put("window", flat_panel((-w, 0.2 * h, front - 0.3 * depth), (0, 0, -0.25 * depth), (0, 0.65 * h, 0)), window)
     put("right wall", flat_panel((w, 0, back), (0, 0, depth), (0, h, 0)), wall_paint)
-    put("plinth", block((-0.42, 0, -0.42), (0.42, 0.62, 0.42)), plinth)
+    put("plinth", block((-0.36, 0, -0.36), (0.36, 0.5, 0.36)), plinth)
 
     def relief(u, v):
         # Ribs that wind once around the tube per eighth of the knot, with a slow swell.
@@ -124,9 +125,9 @@ def knot():
 
     shape = torus_knot(2, 3, 0.5, 0.215, 0.125, 480, 76, relief)
     shape.uvs = [(8 * u, 2 * v) for u, v in shape.uvs]
-    base = g.node("sculpture", at=(0, 0.62, 0))
+    base = g.node("sculpture", at=(0, 0.5, 0))
     # Upright, its axis towards the camera; its lowest point sits on the plinth.
     lift = max(p[2] for p in shape.positions)
-    g.node("torus knot", g.mesh("torus knot", (g.geometry(shape, "u16"), glazed)), at=(0, lift, 0), turn=turn((1, 0, 0), 90), parent=base)
-    g.camera("camera", (0.75, 1.55, 3.2), (0.0, 1.16, 0), 36)
+    g.node("torus knot", g.mesh("torus knot", (g.geometry(shape, "u16"), glazed)), at=(0, 0.95 * lift, 0), turn=turn((1, 0, 0), 90), size=0.95, parent=base)
+    g.camera("camera", (0.8, 1.55, 3.3), (0.0, 1.18, 0), 37)
     return g
