@@ -1,1 +1,3 @@
-//! (to come)
+//! Numerical idioms shared by everything above.
+
+pub mod robust;
