@@ -4,7 +4,7 @@
 //! by inverting the distribution function (not an alias table, which would undo the stratification of the number).
 
 use crate::material::table::MaterialTable;
-use crate::math::{V3, origin};
+use crate::math::{V3, robust};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use simd::{Float, Lanes, Mask, Uint};
@@ -122,7 +122,7 @@ impl LightTable {
                     record(corners[1] - corners[0], pmf32),
                     record(corners[2] - corners[0], density),
                     record(zero, f32::from_bits(material)),
-                    record(ng, ng.abs().dot(max_abs) * origin::GAMMA_16),
+                    record(ng, ng.abs().dot(max_abs) * robust::gamma(16)),
                     [f32::from_bits(attributes), 0.0, 0.0, 0.0],
                 ]);
                 self.has_triangles = true;
@@ -253,7 +253,7 @@ impl LightTable {
         let pdf = record[2][3] * distance2 / cos.abs();
         // Off the light's surface, on the side that is seen.
         let side = L::F::one().or_else(front, -L::F::one());
-        let end = origin::offset_point(point, ng.scale(side), normal[3]);
+        let end = robust::offset_point(point, ng.scale(side), normal[3]);
         let (mut uv0, mut uv1) = (L::F::zero(), L::F::zero());
         if triangles.has_attributes() {
             let attributes = (at + L::U::splat(5)).records(&self.records)[0].to_bits();

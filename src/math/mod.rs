@@ -1,8 +1,8 @@
-//! Vectors over lanes, frames, ray origins, hashing of random numbers' keys. glam serves everything scalar.
+//! Vectors over lanes, frames, rounding bounds and ray origins. glam serves everything scalar.
 
 mod frame;
 pub mod lanes;
-pub mod origin;
+pub mod robust;
 
 pub use frame::Frame;
 pub use lanes::V3;

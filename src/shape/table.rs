@@ -1,6 +1,6 @@
 //! Triangles as shading reads them: four 16-byte records, one cache line, a triangle.
 
-use crate::math::{V3, origin};
+use crate::math::{V3, robust};
 use simd::{Float, Lanes, Uint};
 
 /// Index of no attributes, in records.
@@ -183,10 +183,10 @@ impl<L: Lanes> Triangle<L> {
         self.e2.mul_add(v, self.e1.mul_add(u, self.v0))
     }
 
-    /// How far a ray's origin is moved off the surface, metres: the bound of [`origin::offset_length`].
+    /// How far a ray's origin is moved off the surface, metres: the bound of [`robust::offset_length`].
     #[inline(always)]
     pub fn offset_length(&self) -> L::F {
         let max_abs = self.v0.abs().max((self.v0 + self.e1).abs()).max((self.v0 + self.e2).abs());
-        origin::offset_length(max_abs, self.ng)
+        robust::offset_length(max_abs, self.ng)
     }
 }
