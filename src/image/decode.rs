@@ -164,6 +164,20 @@ mod tests {
     }
 
     #[test]
+    fn jpeg_is_read_and_its_truncations_do_not_panic() {
+        let mut bytes = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 100)
+            .write_image(&[200; 64], 8, 8, ExtendedColorType::L8)
+            .unwrap();
+        let (pixels, format) = rgba8(&bytes).unwrap();
+        assert_eq!((format, pixels.texels.len()), (Format::Jpeg, 64));
+        assert!(pixels.texels.iter().all(|t| t[0].abs_diff(200) <= 2 && t[0] == t[1] && t[3] == 255));
+        for n in 0..bytes.len() {
+            let _ = decode(&bytes[..n]);
+        }
+    }
+
+    #[test]
     fn sixteen_bits_are_refused_by_name() {
         let error = rgba8(&png(&[0; 6], 1, 1, ExtendedColorType::Rgb16)).unwrap_err();
         assert!(error.problem.contains("16 bits"), "{error:?}");

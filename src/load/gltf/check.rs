@@ -26,9 +26,7 @@ fn number(version: &str) -> Option<(u32, u32)> {
 
 /// Indices and enumerations above 2^32 - 1, which the `gltf` crate would cut to 32 bits and so take for others.
 pub(super) fn integers(doc: &Document) -> Result<()> {
-    let is_digit = |c: &u8| c.is_ascii_digit();
-    let suspicious = doc.json().split(|c| !is_digit(c)).any(|run| run.len() >= 10);
-    if !suspicious {
+    if !has_long_integer(doc.json()) {
         return Ok(());
     }
     let Ok(value) = serde_json::from_slice::<Value>(doc.json()) else { return Ok(()) };
@@ -36,6 +34,22 @@ pub(super) fn integers(doc: &Document) -> Result<()> {
         None => Ok(()),
         Some(at) => Err(doc.bad(&at, "is not an index or a constant of glTF", "It must be less than 2^32 - 1.")),
     }
+}
+
+/// Whether ten digits or more follow each other that are not the decimals of a number: cheap, and rarely true.
+fn has_long_integer(json: &[u8]) -> bool {
+    let (mut run, mut before) = (0_usize, b' ');
+    for &c in json {
+        if !c.is_ascii_digit() {
+            (run, before) = (0, c);
+        } else {
+            run += 1;
+            if run >= 10 && before != b'.' {
+                return true;
+            }
+        }
+    }
+    false
 }
 
 /// Keys whose value is an index or one of a few constants.

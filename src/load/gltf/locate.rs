@@ -30,10 +30,10 @@ impl Document {
         list.get(index.value()).ok_or_else(|| {
             let allowed = match list.len() {
                 0 => format!("The file has no {kind}."),
-                1 => format!("The file has one of {kind}: only 0 is allowed."),
-                n => format!("The file has {n} {kind}: 0 to {} are allowed.", n - 1),
+                1 => "The file has 1 of them: only 0 is allowed.".to_owned(),
+                n => format!("The file has {n} of them: 0 to {} are allowed.", n - 1),
             };
-            self.bad(pointer, &format!("is not the index of one of {kind}"), allowed)
+            self.bad(pointer, &format!("is not an index into {kind}"), allowed)
         })
     }
 

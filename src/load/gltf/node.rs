@@ -25,6 +25,9 @@ pub(super) struct Chosen {
 pub(super) fn choose_scene(doc: &Document, wanted: Option<&str>, parents: &[Option<usize>]) -> Result<Chosen> {
     let scenes = &doc.root.scenes;
     if scenes.is_empty() {
+        if let Some(index) = doc.root.scene {
+            doc.item(scenes, index, "/scene", "scenes")?;
+        }
         if let Some(wanted) = wanted {
             let fix = "The file has no scenes: leave --scene out to see all its nodes.";
             return Err(doc.error("/scenes", format!("there is no scene \"{}\"", shorten(wanted)), fix));
