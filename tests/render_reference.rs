@@ -10,9 +10,10 @@
 
 mod support;
 
-use support::pictures::{channel_means, reference_stats, settings, shoot_seeds};
-use support::verdict::{Expected, MAX_BIAS, mean_test};
-use support::{closed, planted, scenes};
+use support::pictures::{reference_stats, settings, shoot_seeds};
+use support::reference::mean_verdicts;
+use support::verdict::{MAX_BIAS, MeanVerdict};
+use support::{planted, scenes};
 
 /// Pixels across and down.
 const SIZE: u32 = 64;
@@ -32,30 +33,15 @@ fn check(name: &str, spp: u32) {
     assert_eq!(compare(name, &brighter).len(), 3, "{name}: half a percent more light must fail in every channel");
 }
 
-/// One line for each channel that is wrong: the mean of the pixels that have an exact value against theirs, or that of
-/// the whole picture against Mitsuba's.
+/// One line for each channel that is wrong.
 fn compare(name: &str, runs: &[Vec<[f32; 3]>]) -> Vec<String> {
-    let exact = closed::reference_pixels(name, SIZE as usize);
     let stats = reference_stats(&scenes::reference_folder(name), "ref_mitsuba");
-    let judge = |channel: usize| {
-        let (values, expected): (Vec<f64>, _) = match &exact {
-            Some(exact) => {
-                let known: Vec<usize> = (0..exact.len()).filter(|&i| exact[i].is_some()).collect();
-                let mean = |f: &dyn Fn(usize) -> f64| known.iter().map(|&i| f(i)).sum::<f64>() / known.len() as f64;
-                let value = mean(&|i| exact[i].map_or(0.0, |e| e[channel]));
-                let values = runs.iter().map(|run| mean(&|i| f64::from(run[i][channel]))).collect();
-                (values, Expected { value, rel_se: 0.0 })
-            }
-            None => (
-                runs.iter().map(|run| channel_means(run)[channel]).collect(),
-                Expected { value: stats.mean[channel], rel_se: stats.mean_rel_se[channel] },
-            ),
-        };
-        let verdict = mean_test(&values, expected);
+    let verdicts = mean_verdicts(name, runs, &stats, SIZE as usize);
+    let judge = |(channel, verdict): (usize, &MeanVerdict)| {
         println!("{name}[{channel}]: bias {:+.5} %, s.e. {:.5} %", 100.0 * verdict.bias, 100.0 * verdict.rel_se);
-        verdict.within(MAX_BIAS).map_err(|e| format!("channel {channel}: {e}"))
+        verdict.within(MAX_BIAS).err().map(|e| format!("channel {channel}: {e}"))
     };
-    (0..3).filter_map(|channel| judge(channel).err()).collect()
+    verdicts.iter().enumerate().filter_map(judge).collect()
 }
 
 #[test]
