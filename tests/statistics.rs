@@ -223,3 +223,28 @@ fn ggx_albedo_equals_its_closed_form_and_the_table() {
         assert_close(closed::white_dielectric_albedo(mu, alpha, 0.04), e, 1e-4);
     }
 }
+
+#[test]
+fn built_scenes_face_the_way_they_say() {
+    use glam::{DVec3, Vec3};
+    let mut builder = prt::scene::SceneBuilder::new(0);
+    let material = builder.add_material(support::scenes::lambert(0.5));
+    support::scenes::add_room(&mut builder, 1.0, material);
+    support::scenes::add_floor(&mut builder, 0.5, material);
+    let (eye, target) = (DVec3::new(3.0, 1.5, -2.0), DVec3::new(0.0, 1.0, 0.5));
+    support::scenes::add_camera(&mut builder, eye, target, 1.0);
+    let scene = builder.finish();
+    assert_eq!(scene.triangle_count(), 14);
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        for [a, b, c] in mesh.indices.iter().map(|t| t.map(|v| Vec3::from(mesh.positions[v as usize]))) {
+            let normal = (b - a).cross(c - a);
+            let towards = if i < 6 { -(a + b + c) } else { Vec3::Y };
+            assert!(normal.length() > 0.0 && normal.angle_between(towards) < 1.0, "mesh {i}");
+        }
+    }
+    let camera = scene.cameras[0].world_from_camera;
+    assert!((camera.determinant() - 1.0).abs() < 1e-12);
+    assert!(camera.transform_vector3(DVec3::NEG_Z).abs_diff_eq((target - eye).normalize(), 1e-12));
+    assert!(camera.transform_vector3(DVec3::Y).y > 0.9);
+    assert_eq!(camera.transform_point3(DVec3::ZERO), eye);
+}
