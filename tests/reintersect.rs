@@ -62,9 +62,9 @@ fn self_hits(accel: &dyn Accel, mesh: &Triangles, i: usize, centre: Option<Vec3>
 }
 
 fn cases() -> impl Iterator<Item = (f32, Vec3)> {
-    [1e-6f32, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6, 1e7].into_iter().flat_map(|s| {
-        [0.0, 1e2, 1e4, 1e6].into_iter().map(move |t| (s, Vec3::new(1.0, 0.3, -0.7) * t * s))
-    })
+    [1e-6f32, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6, 1e7]
+        .into_iter()
+        .flat_map(|s| [0.0, 1e2, 1e4, 1e6].into_iter().map(move |t| (s, Vec3::new(1.0, 0.3, -0.7) * t * s)))
 }
 
 #[test]

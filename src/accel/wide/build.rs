@@ -9,6 +9,7 @@
 use super::collapse::{Costs, combine, leaf_cost};
 use super::node::Child;
 use crate::accel::Triangles;
+use crate::accel::woop::can_be_hit;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
@@ -36,8 +37,7 @@ impl Reference {
     /// distance is the ray's, see `ray.rs`).
     fn new(triangles: &Triangles, i: usize) -> Option<Self> {
         let [a, b, c] = triangles.corners(i);
-        // Two equal corners: one edge function is exactly 0, the others exactly opposite, so no ray ever hits it.
-        if a == b || b == c || c == a {
+        if !can_be_hit([a, b, c]) {
             return None;
         }
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));

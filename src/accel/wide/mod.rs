@@ -16,7 +16,7 @@ use node::{Leaves, Node};
 use simd::{Level, dispatch};
 use std::ops::Range;
 
-/// The tree. Triangles of zero area whose corners coincide are left out: no ray hits them.
+/// The tree, over all triangles but those of zero area.
 #[derive(Clone, Debug)]
 pub struct WideBvh {
     nodes: Vec<Node>,

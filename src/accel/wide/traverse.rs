@@ -16,7 +16,7 @@ use std::ops::Range;
 
 /// Entries of the stack, a power of two. A node adds at most 7 more than it takes.
 pub const STACK: usize = 512;
-const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) + 1 <= STACK && STACK.is_power_of_two());
+const _: () = assert!(MAX_DEPTH as usize * (WIDTH - 1) < STACK && STACK.is_power_of_two());
 
 /// A child still to be visited.
 #[derive(Clone, Copy)]
