@@ -1,1 +1,3 @@
-//! (to come)
+//! Pictures in files.
+
+pub mod decode;

@@ -2,7 +2,9 @@
 //!
 //! After Pharr, Jakob and Humphreys 2023, "Physically Based Rendering", 4th edition, section 6.8.
 
+use super::V3;
 use glam::Vec3;
+use simd::{Float, Lanes};
 
 /// Relative error bound of `n` roundings in f32, `n eps / (1 - n eps)` with `eps = 2^-24`.
 pub const fn gamma(n: u32) -> f32 {
@@ -34,6 +36,29 @@ pub fn offset_origin(p: Vec3, extent: Vec3, ng: Vec3, d: Vec3) -> Vec3 {
         }
     };
     Vec3::new(away(moved.x, offset.x), away(moved.y, offset.y), away(moved.z, offset.z))
+}
+
+/// A little more than one ulp of relative size, in place of a `nextafter`.
+const ULP: f32 = 1.25e-7;
+
+/// Length of the offset along the unit normal `ng`: the bound of a point on the triangle whose corners are at most
+/// `max_abs` in magnitude, projected on the normal.
+#[inline(always)]
+pub fn offset_length<L: Lanes>(max_abs: V3<L>, ng: V3<L>) -> L::F {
+    ng.abs().dot(max_abs) * L::F::splat(gamma(16))
+}
+
+/// `p` moved by `length` along `ng`, and one ulp further in each component, so that rounding cannot undo it.
+#[inline(always)]
+pub fn offset_point<L: Lanes>(p: V3<L>, ng: V3<L>, length: L::F) -> V3<L> {
+    let moved = ng.mul_add(length, p);
+    V3::new(further(moved.x, ng.x), further(moved.y, ng.y), further(moved.z, ng.z))
+}
+
+/// `v` one ulp further in the direction of `n`'s sign.
+#[inline(always)]
+fn further<F: Float>(v: F, n: F) -> F {
+    v + (v.abs() * F::splat(ULP)).copysign(n)
 }
 
 #[cfg(test)]
