@@ -1,9 +1,11 @@
 //! Measures ray queries: `cargo run --release --example rays [triangles in thousands] [rays in thousands]`.
 //!
-//! A displaced sphere in a box, one thread. Prints Mray/s per core (the median of five rounds, backends interleaved) for
+//! A displaced sphere in a box, one thread. Prints Mray/s per core (the best of nine rounds, backends
+//! interleaved) for
 //! camera rays in pixel order, diffuse bounces from where those hit, and shadow rays from there to a lamp.
 
 use glam::Vec3;
+use prt::accel::embree::EmbreeAccel;
 use prt::accel::linear::Linear;
 use prt::accel::wide::WideBvh;
 use prt::accel::{Accel, HitBatch, MISS, RayBatch, Triangles};
@@ -13,11 +15,11 @@ use std::time::Instant;
 
 /// Rays per batch, as the renderer sends them.
 const BATCH: usize = 2048;
-const ROUNDS: usize = 5;
+const ROUNDS: usize = 9;
 
 fn main() {
     let arg = |i: usize, default: usize| std::env::args().nth(i).and_then(|a| a.parse().ok()).unwrap_or(default);
-    let (triangles, rays) = (arg(1, 500) * 1000, arg(2, 400) * 1000);
+    let (triangles, rays) = (arg(1, 500) * 1000, arg(2, 200) * 1000);
     let scene = scene(triangles);
     let n = scene.indices.len();
     let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
@@ -29,7 +31,7 @@ fn main() {
         })
         .collect();
     seconds.sort_by(f64::total_cmp);
-    println!("{n} triangles; build, 1 thread: {:.2} Mtri/s", n as f64 / seconds[ROUNDS / 2] * 1e-6);
+    println!("{n} triangles; build, 1 thread: {:.2} Mtri/s", n as f64 / seconds[0] * 1e-6);
 
     let wide = WideBvh::build(&scene);
     println!("{:?}", wide.stats());
@@ -37,6 +39,10 @@ fn main() {
         vec![Box::new(WideBvh::with_level(&scene, Level::Portable8)), Box::new(wide.clone())];
     if n <= 2000 {
         backends.push(Box::new(Linear::new(scene.clone())));
+    }
+    match EmbreeAccel::build(&scene, &[]) {
+        Ok(embree) => backends.push(Box::new(embree)),
+        Err(error) => println!("without Embree: {error}"),
     }
     let (camera, diffuse, shadow) = ray_sets(&wide, rays);
     for (name, rays) in [("camera", &camera), ("diffuse", &diffuse), ("shadow", &shadow)] {
@@ -71,8 +77,8 @@ fn report(name: &str, rays: &[RayBatch], backends: &[Box<dyn Accel>]) {
     for (i, accel) in backends.iter().enumerate() {
         times[i].sort_by(f64::total_cmp);
         let stats = accel.stats();
-        assert_eq!(sums[i], sums[0], "{} finds other hits", stats.name);
-        print!("   {} {} {:6.2} Mray/s", stats.name, stats.isa, count / times[i][ROUNDS / 2] * 1e-6);
+        assert!((sums[i] - sums[0]).abs() <= 1e-5 * count, "{}: {} hits, not {}", stats.name, sums[i], sums[0]);
+        print!("   {} {} {:6.2} Mray/s", stats.name, stats.isa, count / times[i][0] * 1e-6);
     }
     println!();
 }
