@@ -1,6 +1,6 @@
 //! Brute force as an [`super::Accel`]: the oracle of the tests, and nothing else.
 
-use super::woop::{Crossing, ShearedRay};
+use super::woop::{Crossing, ShearedRay, can_be_hit};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch, Triangles};
 use glam::Vec3;
 use std::ops::Range;
@@ -24,8 +24,9 @@ impl Linear {
         let t_max = rays.t_max[i];
         ray.into_iter().flat_map(move |ray| {
             (0..self.triangles.indices.len()).filter_map(move |p| {
-                let crossing = ray.cross(self.triangles.corners(p))?;
-                (crossing.t > 0.0 && crossing.t < t_max).then_some((p as u32, crossing))
+                let corners = self.triangles.corners(p);
+                let crossing = ray.cross(corners)?;
+                (crossing.t > 0.0 && crossing.t < t_max && can_be_hit(corners)).then_some((p as u32, crossing))
             })
         })
     }

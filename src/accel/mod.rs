@@ -46,6 +46,7 @@ pub struct AccelStats {
 /// A built acceleration structure. Called once per batch of about 2000 rays, so `dyn` costs nothing here.
 ///
 /// Hits lie in 0 < t < `t_max`, both ends excluded: origins are already offset, so t = 0 is the surface that was left.
+/// `bvh` and `linear` leave out triangles of exactly zero area, which a rounded test would hit now and then.
 /// A ray with a non-finite origin or direction, a zero direction or a NaN `t_max` misses. Ties (equal t) go to the
 /// lowest primitive for `bvh` and `linear`.
 pub trait Accel: Send + Sync {

@@ -33,7 +33,7 @@ impl Rng {
 
     /// In 0..n.
     pub fn below(&mut self, n: usize) -> usize {
-        (u64::from(self.bits()) * n as u64 >> 32) as usize
+        ((u64::from(self.bits()) * n as u64) >> 32) as usize
     }
 
     /// Uniform on the unit sphere.
