@@ -7,6 +7,7 @@ mod batch;
 pub mod embree;
 pub mod linear;
 pub mod wide;
+mod woop;
 
 pub use batch::{HitBatch, MISS, RayBatch};
 
@@ -44,8 +45,10 @@ pub struct AccelStats {
 
 /// A built acceleration structure. Called once per batch of about 2000 rays, so `dyn` costs nothing here.
 ///
-/// Rays run from t = 0 (exclusive of nothing: origins are already offset) to `t_max`; a ray with a non-finite
-/// origin or direction misses. Ties (equal t) go to the lowest primitive for `bvh` and `linear`.
+/// Hits lie in 0 < t < `t_max`, both ends excluded: origins are already offset, so t = 0 is the surface that was left.
+/// `bvh` and `linear` leave out triangles of exactly zero area, which a rounded test would hit now and then.
+/// A ray with a non-finite origin or direction, a zero direction or a NaN `t_max` misses. Ties (equal t) go to the
+/// lowest primitive for `bvh` and `linear`.
 pub trait Accel: Send + Sync {
     /// Nearest hits of `rays[range]` into `hits[range]`. `coherent` is a hint: camera rays in pixel order.
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch);

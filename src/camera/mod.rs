@@ -1,5 +1,9 @@
 //! Cameras as described by the file.
 
+mod rays;
+
+pub use rays::CameraRays;
+
 use glam::DMat4;
 
 /// A camera with its place; looks along its local -Z, +Y up.

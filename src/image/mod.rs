@@ -1,5 +1,6 @@
-//! Picture files: EXR and PNG out (always to memory first: [`crate::batch`] puts bytes on disk), EXR in.
+//! Picture files: textures in, EXR and PNG out (always to memory first: [`crate::batch`] puts bytes on disk), EXR in.
 
+pub mod decode;
 pub mod exr;
 mod exr_header;
 pub mod exr_read;

@@ -1,1 +1,53 @@
-//! (to come)
+//! The path tracer as a batched wavefront: [`wave`] is the loop, [`pool`] the state of the paths, [`shade`] one vertex.
+//!
+//! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
+//! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
+
+mod pool;
+mod shade;
+mod wave;
+
+pub use wave::{Counters, SampleSink, Unit, Worker};
+
+use crate::accel::Accel;
+use crate::camera::CameraRays;
+use crate::film::PixelFilter;
+use crate::light::table::LightTable;
+use crate::material::table::MaterialTable;
+use crate::shape::table::TriangleTable;
+use crate::texture::lookup::TextureTable;
+use simd::Level;
+
+/// Everything shading reads, prepared and immutable.
+pub struct SceneTables {
+    /// Triangles with their attributes.
+    pub triangles: TriangleTable,
+    /// Surface parameters.
+    pub materials: MaterialTable,
+    /// Texels.
+    pub textures: TextureTable,
+    /// Lights with selection probabilities.
+    pub lights: LightTable,
+}
+
+/// A path tracer for one picture: tables, rays, settings. Shared by all workers.
+pub struct PathTracer<'a> {
+    /// What shading reads.
+    pub tables: &'a SceneTables,
+    /// What rays hit.
+    pub accel: &'a dyn Accel,
+    /// Where rays start.
+    pub camera: CameraRays,
+    /// How film points are spread about pixel centres.
+    pub filter: PixelFilter,
+    /// Scatterings after the first.
+    pub max_bounces: u32,
+    /// Whether reaching `max_bounces` counts as truncation (a safety cap) and not as the user's wish.
+    pub is_capped: bool,
+    /// Random numbers' seed.
+    pub seed: u64,
+    /// Frame number, part of the random numbers.
+    pub frame: u32,
+    /// Instructions for shading.
+    pub level: Level,
+}

@@ -1,5 +1,7 @@
 //! Punctual lights (`KHR_lights_punctual`). Emissive surfaces are materials.
 
+pub mod table;
+
 /// A light without size. It shines along the local -Z axis where it has a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {

@@ -1,5 +1,8 @@
 //! Materials as described by the file, in glTF's names.
 
+pub mod bsdf;
+pub mod table;
+
 use crate::texture::Param;
 
 /// Metallic-roughness parameters with `KHR_materials_specular` and `KHR_materials_emissive_strength`.

@@ -1,11 +1,14 @@
 //! From a scene and settings to a [`Frame`].
 
+mod frame;
+mod prepare;
+mod schedule;
 mod settings;
 
+pub use frame::render;
+pub use prepare::{Prepared, prepare};
 pub use settings::{AccelChoice, Brdf, CropWindow, Filter, RenderSettings};
 
-use crate::error::RenderError;
-use crate::scene::Scene;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
 /// Watched and steered from another thread while a frame renders.
@@ -17,7 +20,7 @@ pub struct Progress {
     pub total: AtomicU64,
     /// Rays traced so far.
     pub rays: AtomicU64,
-    /// Set it and the render ends soon with [`RenderError::Interrupted`].
+    /// Set it and the render ends soon with [`crate::error::RenderError::Interrupted`].
     pub cancel: AtomicBool,
 }
 
@@ -99,18 +102,4 @@ pub struct Frame {
     pub camera: FrameCamera,
     /// Counts and times.
     pub stats: RenderStats,
-}
-
-/// Renders camera `camera` of `scene` (an index into `scene.cameras`; a scene without cameras has one framed on its
-/// bounds, index 0).
-///
-/// # Errors
-/// The backend is not to be had, the scene is too large, or `progress.cancel` was set.
-pub fn render(
-    _scene: &Scene,
-    _camera: usize,
-    _settings: &RenderSettings,
-    _progress: &Progress,
-) -> Result<Frame, RenderError> {
-    Err(RenderError::Interrupted)
 }

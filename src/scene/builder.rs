@@ -28,6 +28,11 @@ impl SceneBuilder {
         Self { scene: Scene { index, ..Scene::default() } }
     }
 
+    /// The index given to [`SceneBuilder::new`].
+    pub fn scene_index(&self) -> usize {
+        self.scene.index
+    }
+
     add!(add_mesh, meshes, Mesh, MeshId);
     add!(add_material, materials, Material, MaterialId);
     add!(add_texture, textures, Texture, TextureId);

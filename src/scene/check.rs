@@ -1,6 +1,194 @@
 //! What every scene must satisfy before it is prepared.
 
 use super::Scene;
+use crate::shape::Mesh;
+use glam::DVec3;
+
+/// Coordinates beyond this are dropped: Embree ignores such triangles without a word
+/// (`rtcCommitScene`: "|value| > 1.844e18"), so both backends must.
+pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
+
+/// Names listed in a counted warning.
+const NAMES_SHOWN: usize = 3;
 
 /// Checks ids and drops unusable triangles, with a counted warning for each kind.
-pub(super) fn check(_scene: &mut Scene) {}
+///
+/// # Panics
+/// When an id, a vertex index or the length of an attribute is wrong: a bug of the loader.
+pub(super) fn check(scene: &mut Scene) {
+    check_ids(scene);
+    let mut unusable = Tally::default();
+    let mut flat = Tally::default();
+    let mut uvs = Tally::default();
+    for mesh in &mut scene.meshes {
+        let [bad, empty] = drop_triangles(mesh);
+        unusable.add(bad, &mesh.name);
+        flat.add(empty, &mesh.name);
+        uvs.add(clean_uvs(mesh), &mesh.name);
+    }
+    unusable.warn(scene, "triangles dropped: a vertex is not finite or is beyond 1.844e18");
+    flat.warn(scene, "triangles dropped: without area");
+    uvs.warn(scene, "texture coordinates that are not finite: taken as 0");
+}
+
+fn check_ids(scene: &Scene) {
+    for instance in &scene.instances {
+        scene.meshes.get(instance.mesh.index()).expect("an instance's mesh was added to the builder");
+        assert!(instance.world_from_object.is_finite(), "world transforms are finite");
+    }
+    for mesh in &scene.meshes {
+        scene.materials.get(mesh.material.index()).expect("a mesh's material was added to the builder");
+        let n = mesh.positions.len();
+        assert!(mesh.normals.as_ref().is_none_or(|a| a.len() == n), "one normal per vertex");
+        assert!(mesh.uvs.as_ref().is_none_or(|a| a.len() == n), "one texture coordinate per vertex");
+        assert!(mesh.tangents.as_ref().is_none_or(|a| a.len() == n), "one tangent per vertex");
+        assert!(mesh.indices.as_flattened().iter().all(|&i| (i as usize) < n), "vertex indices are in range");
+    }
+    for m in &scene.materials {
+        let colors = [m.base_color.texture, m.emission.texture, m.specular_color.texture];
+        let scalars = [m.metallic.texture, m.roughness.texture, m.normal.texture, m.specular.texture];
+        for id in colors.into_iter().chain(scalars).flatten() {
+            scene.textures.get(id.index()).expect("a material's texture was added to the builder");
+        }
+    }
+    for texture in &scene.textures {
+        let image = scene.images.get(texture.image.index()).expect("a texture's image was added to the builder");
+        let size = image.width as usize * image.height as usize;
+        assert!(size > 0 && image.texels.len() == size, "an image has width x height texels");
+    }
+}
+
+/// How many triangles of `mesh` were dropped: for an unusable vertex, for want of area.
+fn drop_triangles(mesh: &mut Mesh) -> [usize; 2] {
+    let usable = |p: &[f32; 3]| p.iter().all(|c| c.abs() <= MAX_COORDINATE);
+    let positions = &mesh.positions;
+    let (mut unusable, mut flat) = (0, 0);
+    mesh.indices.retain(|triangle| {
+        let corners = triangle.map(|i| positions[i as usize]);
+        if !corners.iter().all(usable) {
+            unusable += 1;
+            return false;
+        }
+        let has_area = !is_flat(corners);
+        flat += usize::from(!has_area);
+        has_area
+    });
+    // Vertices that nothing uses any more must not spoil bounds: `positions` are finite from here on.
+    if unusable > 0 || !mesh.positions.iter().all(usable) {
+        let stand_in = mesh.positions.iter().find(|p| usable(p)).copied().unwrap_or([0.0; 3]);
+        mesh.positions.iter_mut().filter(|p| !usable(p)).for_each(|p| *p = stand_in);
+    }
+    [unusable, flat]
+}
+
+/// Whether the area is exactly 0. In f64, where the cross product of f32 edges neither underflows nor, for corners
+/// of like exponents, rounds (f32 would lose every edge below 3.3e-10).
+fn is_flat(corners: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| DVec3::from_array(p.map(f64::from)));
+    (b - a).cross(c - a) == DVec3::ZERO
+}
+
+/// How many texture coordinates were not finite; they become 0.
+fn clean_uvs(mesh: &mut Mesh) -> usize {
+    let bad = |uv: &&mut [f32; 2]| !uv.iter().all(|c| c.is_finite());
+    mesh.uvs.iter_mut().flatten().filter(bad).map(|uv| *uv = [0.0; 2]).count()
+}
+
+/// A count over meshes, with the names of the first few.
+#[derive(Default)]
+struct Tally {
+    count: usize,
+    names: Vec<String>,
+    more: usize,
+}
+
+impl Tally {
+    fn add(&mut self, count: usize, name: &str) {
+        self.count += count;
+        if count == 0 || self.names.iter().any(|n| n == name) {
+            return;
+        }
+        match self.names.len() < NAMES_SHOWN {
+            true => self.names.push(name.to_owned()),
+            false => self.more += 1,
+        }
+    }
+
+    fn warn(self, scene: &mut Scene, what: &str) {
+        if self.count > 0 {
+            let more = if self.more > 0 { format!(" and {} more", self.more) } else { String::new() };
+            scene.warnings.push(format!("{} {what} (in {}{more})", self.count, self.names.join(", ")));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Material;
+    use crate::scene::MaterialId;
+
+    fn scene(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Scene {
+        let mesh = Mesh {
+            positions,
+            normals: None,
+            uvs: None,
+            tangents: None,
+            indices,
+            material: MaterialId(0),
+            name: "m".into(),
+        };
+        Scene { meshes: vec![mesh], materials: vec![Material::default()], ..Scene::default() }
+    }
+
+    #[test]
+    fn triangles_with_unusable_vertices_are_dropped_and_counted() {
+        let bad = [f32::NAN, f32::INFINITY, -1.9e18, f32::MAX];
+        let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        positions.extend(bad.map(|b| [0.0, b, 0.0]));
+        let mut scene = scene(positions, vec![[0, 1, 2], [0, 1, 3], [4, 1, 0], [0, 5, 1], [0, 1, 6]]);
+        check(&mut scene);
+        assert_eq!(scene.meshes[0].indices, [[0, 1, 2]]);
+        assert!(scene.meshes[0].positions.iter().flatten().all(|c| c.abs() <= 1.0));
+        assert_eq!(scene.warnings.len(), 1);
+        assert!(scene.warnings[0].starts_with("4 triangles dropped: a vertex"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn triangles_without_area_are_dropped_but_tiny_ones_stay() {
+        let e = 1e-30;
+        let positions = vec![[0.0; 3], [e, 0.0, 0.0], [0.0, e, 0.0], [2.0 * e, 0.0, 0.0], [0.0; 3]];
+        let indices = vec![[0, 1, 2], [0, 1, 3], [0, 0, 1], [0, 4, 1], [1, 1, 1]];
+        let mut scene = scene(positions, indices);
+        check(&mut scene);
+        assert_eq!(scene.meshes[0].indices, [[0, 1, 2]]);
+        assert!(scene.warnings[0].starts_with("4 triangles dropped: without area"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn non_finite_uvs_become_zero() {
+        let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+        scene.meshes[0].uvs = Some(vec![[0.5, f32::NAN], [1.0, 2.0], [f32::INFINITY, 0.0]]);
+        check(&mut scene);
+        assert_eq!(scene.meshes[0].uvs.as_deref(), Some(&[[0.0, 0.0], [1.0, 2.0], [0.0, 0.0]][..]));
+        assert!(scene.warnings[0].starts_with("2 texture coordinates"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn normals_are_left_to_the_renderer() {
+        let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+        scene.meshes[0].normals = Some(vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 1.0]]);
+        check(&mut scene);
+        assert!(scene.warnings.is_empty());
+        assert_eq!(scene.triangle_count(), 0);
+        assert_eq!(scene.meshes[0].indices.len(), 1);
+    }
+
+    #[test]
+    #[should_panic(expected = "material was added")]
+    fn unknown_material_id_is_a_loader_bug() {
+        let mut scene = scene(vec![], vec![]);
+        scene.materials.clear();
+        check(&mut scene);
+    }
+}

@@ -1,5 +1,7 @@
 //! Shapes: for now triangle meshes.
 
+pub mod table;
+
 use crate::scene::MaterialId;
 
 /// Triangles of one material, object space (one glTF primitive).

@@ -1,5 +1,7 @@
 //! Image textures as described by the file. Lookups over N lanes are in [`lookup`].
 
+pub mod lookup;
+
 use crate::scene::{ImageId, TextureId};
 
 /// Decoded pixels, 8 bits a channel, as encoded in the file (sRGB or linear is decided by the use, not here).

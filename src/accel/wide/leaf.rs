@@ -1,0 +1,122 @@
+//! The watertight test on a whole leaf: the operations of `woop.rs`, in its order, on 8 triangles.
+
+use super::node::{Child, Leaves, WIDTH};
+use super::ray::LeafRay;
+use crate::accel::MISS;
+use crate::accel::woop::exact_edge;
+use simd::{Float, Lanes, Mask};
+
+/// The nearest hit so far.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest {
+    pub t: f32,
+    pub u: f32,
+    pub v: f32,
+    pub primitive: u32,
+}
+
+/// Crossings of a ray with up to 8 triangles, in lanes.
+struct Crossings {
+    /// Lanes with t in (0, end].
+    bits: u32,
+    t: [f32; WIDTH],
+    u: [f32; WIDTH],
+    v: [f32; WIDTH],
+}
+
+/// Crossings of `ray` with the triangles of `leaf` in (0, `end`].
+#[inline(always)]
+fn crossings<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, end: f32) -> Option<Crossings> {
+    let n = leaf.count();
+    let rows = &leaves.data[Leaves::offset(leaf)..][..9 * n + WIDTH];
+    let (ax, ay, at) = corner::<L>(rows, 0, n, ray);
+    let (bx, by, bt) = corner::<L>(rows, 3 * n, n, ray);
+    let (cx, cy, ct) = corner::<L>(rows, 6 * n, n, ray);
+    let (mut e0, mut e1, mut e2) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+    let mut bits = one_side::<L>(e0, e1, e2) & ((1 << n) - 1);
+    if bits == 0 {
+        return None;
+    }
+    let zero = L::F::zero();
+    let doubtful = (e0.eq(zero) | e1.eq(zero) | e2.eq(zero)).bits() & bits;
+    if doubtful != 0 {
+        e0 = exact_edges::<L>(e0, cx, by, cy, bx);
+        e1 = exact_edges::<L>(e1, ax, cy, ay, cx);
+        e2 = exact_edges::<L>(e2, bx, ay, by, ax);
+        bits &= one_side::<L>(e0, e1, e2);
+    }
+    let det = (e0 + e1) + e2;
+    let (w, u, v) = (e0 / det, e1 / det, e2 / det);
+    let t = (w * at + u * bt) + v * ct;
+    bits &= (t.gt(zero) & t.le(L::F::splat(end))).bits();
+    if bits == 0 {
+        return None;
+    }
+    let mut out = Crossings { bits, t: [0.0; WIDTH], u: [0.0; WIDTH], v: [0.0; WIDTH] };
+    t.store(&mut out.t, 0);
+    u.store(&mut out.u, 0);
+    v.store(&mut out.v, 0);
+    Some(out)
+}
+
+/// One corner of all triangles, relative to the ray and sheared, and its distance. `first` is where its rows begin.
+#[inline(always)]
+fn corner<L: Lanes>(rows: &[f32], first: usize, n: usize, ray: &LeafRay<L>) -> (L::F, L::F, L::F) {
+    let [kx, ky, kz] = ray.axes;
+    let x = L::F::load(rows, first + kx * n) - ray.origin[0];
+    let y = L::F::load(rows, first + ky * n) - ray.origin[1];
+    let z = L::F::load(rows, first + kz * n) - ray.origin[2];
+    let [sx, sy, sz] = ray.shear;
+    (x - sx * z, y - sy * z, sz * z)
+}
+
+/// Lanes where no edge function is strictly on the other side of another. A NaN may pass: t is NaN then too.
+#[inline(always)]
+fn one_side<L: Lanes>(e0: L::F, e1: L::F, e2: L::F) -> u32 {
+    let zero = L::F::zero();
+    (e0.min(e1).min(e2).ge(zero) | e0.max(e1).max(e2).le(zero)).bits()
+}
+
+/// [`exact_edge`] in every lane. Rare (rays through edges and vertices), so scalar.
+#[inline(always)]
+fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
+    let mut lanes = [[0.0; WIDTH]; 5];
+    edge.store(&mut lanes[0], 0);
+    a.store(&mut lanes[1], 0);
+    b.store(&mut lanes[2], 0);
+    c.store(&mut lanes[3], 0);
+    d.store(&mut lanes[4], 0);
+    let [mut edge, a, b, c, d] = lanes;
+    for i in 0..WIDTH {
+        edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
+    }
+    L::F::load(&edge, 0)
+}
+
+/// Updates `nearest` by the triangles of `leaf`; true if there was a nearer one or, at equal t, one of lower index.
+/// `nearest.t` starts as the ray's end, which is excluded.
+#[inline(always)]
+pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, nearest: &mut Nearest) -> bool {
+    let Some(found) = crossings::<L>(leaves, leaf, ray, nearest.t) else { return false };
+    let mut bits = found.bits;
+    let mut changed = false;
+    while bits != 0 {
+        let i = bits.trailing_zeros() as usize % WIDTH;
+        bits &= bits - 1;
+        let primitive = leaves.primitive(leaf, i);
+        let tie = found.t[i] == nearest.t && nearest.primitive != MISS && primitive < nearest.primitive;
+        if found.t[i] < nearest.t || tie {
+            *nearest = Nearest { t: found.t[i], u: found.u[i], v: found.v[i], primitive };
+            changed = true;
+        }
+    }
+    changed
+}
+
+/// Whether any triangle of `leaf` lies in (0, `t_max`).
+#[inline(always)]
+pub fn occluded<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, t_max: f32) -> bool {
+    let Some(found) = crossings::<L>(leaves, leaf, ray, t_max) else { return false };
+    // The end itself is excluded.
+    (0..WIDTH).any(|i| found.bits >> i & 1 == 1 && found.t[i] < t_max)
+}

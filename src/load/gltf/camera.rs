@@ -1,0 +1,59 @@
+//! Perspective cameras.
+
+use super::node::{Rigid, rigid};
+use super::{Loader, Result, extensions};
+use crate::camera::{Camera, Projection};
+use glam::DMat4;
+use gltf::json::Index;
+use gltf::json::camera::{Camera as Json, Type};
+use gltf::json::validation::Checked;
+use std::f64::consts::PI;
+
+/// Places the camera at `index` (found at `pointer`) by a node whose name and world transform are given.
+pub(super) fn place(
+    loader: &mut Loader,
+    index: Index<Json>,
+    pointer: &str,
+    world: DMat4,
+    node_at: &str,
+    node_name: &str,
+) -> Result<()> {
+    let doc = loader.doc;
+    let found = doc.item(&doc.root.cameras, index, pointer, "cameras")?;
+    let at = format!("/cameras/{}", index.value());
+    if let Some(carried) = &found.extensions {
+        extensions::check_carried(doc, carried.others.keys(), &at, &[])?;
+    }
+    match found.type_ {
+        Checked::Valid(Type::Perspective) => {}
+        Checked::Valid(Type::Orthographic) => {
+            let fix = "Make it a perspective camera, or choose a scene without it.";
+            return Err(doc.not_built(format!("{at}/type"), "orthographic cameras are", fix));
+        }
+        Checked::Invalid => {
+            return Err(doc.bad(&format!("{at}/type"), "is not a kind of camera", "Allowed: perspective."));
+        }
+    }
+    let Some(perspective) = &found.perspective else {
+        return Err(doc.error(at, "has no perspective", "A camera of type perspective needs it, with yfov."));
+    };
+    let yfov = f64::from(perspective.yfov);
+    if !(yfov > 0.0 && yfov < PI) {
+        let fix = "It must be more than 0 and less than pi. Did the exporter write degrees? It is in radians.";
+        return Err(doc.bad(&format!("{at}/perspective/yfov"), "is out of range", fix));
+    }
+    let aspect_ratio = perspective.aspect_ratio.map(f64::from);
+    if aspect_ratio.is_some_and(|a| !(a.is_finite() && a > 0.0)) {
+        let fix = "Width over height must be positive; leave it out to take the picture's own.";
+        return Err(doc.bad(&format!("{at}/perspective/aspectRatio"), "is out of range", fix));
+    }
+    let Rigid::Frame(world_from_camera) = rigid(&world) else {
+        let fix = "A scale of 0 along the camera's z leaves no direction to look in.";
+        return Err(doc.error(node_at, "the camera has no direction", fix));
+    };
+    let name = found.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| node_name.to_owned());
+    let projection = Projection::Perspective { yfov, aspect_ratio };
+    loader.cameras.insert(index.value());
+    loader.builder.add_camera(Camera { name, world_from_camera, projection });
+    Ok(())
+}

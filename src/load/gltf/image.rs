@@ -1,0 +1,99 @@
+//! Images: bytes from a buffer view, a data URI or a file; decoded in parallel, each once.
+
+use super::document::{Document, read_file};
+use super::uri::Source;
+use super::{Loader, Result, name_or};
+use crate::image::decode::{self, Format};
+use crate::texture::Image;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+/// An image that is found but not yet decoded.
+struct Encoded<'d> {
+    index: usize,
+    bytes: Bytes<'d>,
+    /// `mimeType`, or that of the data URI; empty if there is none.
+    media: String,
+    /// Where the bytes came from, for messages.
+    pointer: String,
+}
+
+enum Bytes<'d> {
+    Here(Cow<'d, [u8]>),
+    File(PathBuf),
+}
+
+/// Decodes the images that textures need and adds them to the scene in the order of their ids.
+pub(super) fn decode_all(loader: &mut Loader) -> Result<()> {
+    let doc = loader.doc;
+    let found: Vec<Encoded> = loader.textures.images.iter().map(|&i| find(doc, i)).collect::<Result<_>>()?;
+    // An error is made from its kind afterwards: a document is not shared between threads.
+    let decoded: Vec<_> = found.par_iter().map(decode_one).collect();
+    for (encoded, result) in found.iter().zip(decoded) {
+        let (pixels, format) = result.map_err(|(problem, fix)| doc.error(&encoded.pointer, problem, fix))?;
+        let image = doc.root.images.get(encoded.index);
+        let name = name_or(image.and_then(|i| i.name.as_ref()), "images", encoded.index);
+        if let Some(said) = Format::from_media_type(&encoded.media)
+            && said != format
+        {
+            let text = format!("/images/{}: said to be {said} but is {format}: read as {format}", encoded.index);
+            loader.builder.warn(text);
+        }
+        loader.builder.add_image(Image { width: pixels.width, height: pixels.height, texels: pixels.texels, name });
+    }
+    Ok(())
+}
+
+/// Where the bytes of an image are; the media type is checked.
+fn find(doc: &Document, index: usize) -> Result<Encoded<'_>> {
+    let at = format!("/images/{index}");
+    let Some(image) = doc.root.images.get(index) else {
+        return Err(doc.error(at, "no such image", ""));
+    };
+    let mut media = image.mime_type.as_ref().map(|m| m.0.clone()).unwrap_or_default();
+    let mut media_at = format!("{at}/mimeType");
+    let (bytes, pointer) = match (image.buffer_view, &image.uri) {
+        (Some(view), None) => {
+            let pointer = format!("{at}/bufferView");
+            let (bytes, _) = doc.view(view, &pointer)?;
+            (Bytes::Here(Cow::Borrowed(bytes)), pointer)
+        }
+        (None, Some(uri)) => {
+            let pointer = format!("{at}/uri");
+            let bytes = match doc.resolve(&pointer, uri)? {
+                Source::File(path) => Bytes::File(path),
+                Source::Data(bytes, kind) => {
+                    if media.is_empty() {
+                        (media, media_at) = (kind, pointer.clone());
+                    }
+                    Bytes::Here(Cow::Owned(bytes))
+                }
+            };
+            (bytes, pointer)
+        }
+        (view, _) => {
+            let problem = if view.is_some() { "has both uri and bufferView" } else { "has no uri and no bufferView" };
+            return Err(doc.error(at, problem, "An image has exactly one of the two."));
+        }
+    };
+    // Other media types of data URIs (application/octet-stream) are common and say nothing.
+    if media.starts_with("image/") && Format::from_media_type(&media).is_none() {
+        return Err(doc.error(media_at, format!("{media} is not built yet"), "Allowed: image/png, image/jpeg."));
+    }
+    Ok(Encoded { index, bytes, media, pointer })
+}
+
+/// Pixels and what the bytes turned out to be, or the problem and its remedy.
+fn decode_one(encoded: &Encoded) -> std::result::Result<(decode::Rgba8, Format), (String, String)> {
+    let file;
+    let (bytes, source): (&[u8], String) = match &encoded.bytes {
+        Bytes::Here(bytes) => (bytes, String::new()),
+        Bytes::File(path) => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            file = read_file(path).map_err(|why| (format!("{name}: {why}"), String::new()))?;
+            (&file, format!("{name}: "))
+        }
+    };
+    decode::rgba8(bytes).map_err(|e| (format!("{source}{}", e.problem), e.fix.to_owned()))
+}

@@ -1,0 +1,91 @@
+//! Textures: an image with its sampler.
+
+use super::{Loader, Result, extensions};
+use crate::scene::{ImageId, TextureId};
+use crate::texture::{Filter, Texture, Wrap};
+use gltf::json::Index;
+use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use std::collections::BTreeMap;
+
+/// How the `gltf` crate says that a texture has no `source`.
+const NO_SOURCE: usize = u32::MAX as usize;
+
+/// Textures read so far, and the images that they need.
+#[derive(Debug, Default)]
+pub(super) struct Textures {
+    read: BTreeMap<usize, TextureId>,
+    /// glTF images in the order of our ids.
+    pub images: Vec<usize>,
+}
+
+impl Textures {
+    /// Whether a texture that was read needs the image.
+    pub fn uses_image(&self, image: usize) -> bool {
+        self.images.contains(&image)
+    }
+
+    /// Our id of a glTF image, which will be decoded later.
+    fn image(&mut self, image: usize) -> ImageId {
+        let place = self.images.iter().position(|&i| i == image).unwrap_or_else(|| {
+            self.images.push(image);
+            self.images.len() - 1
+        });
+        ImageId(place as u32)
+    }
+}
+
+/// The texture at `index`, read once; `pointer` is where the index was found.
+pub(super) fn read(loader: &mut Loader, index: Index<gltf::json::Texture>, pointer: &str) -> Result<TextureId> {
+    if let Some(&done) = loader.textures.read.get(&index.value()) {
+        return Ok(done);
+    }
+    let doc = loader.doc;
+    let texture = doc.item(&doc.root.textures, index, pointer, "textures")?;
+    let at = format!("/textures/{}", index.value());
+    let others = texture.extensions.iter().flat_map(|e| e.others.keys());
+    if texture.source.value() == NO_SOURCE {
+        let problem = match others.clone().next() {
+            None => "has no source".to_owned(),
+            Some(name) => format!("has no source but the extension {name}, which is not built yet"),
+        };
+        return Err(doc.error(at, problem, "Only PNG and JPEG images named by source are read."));
+    }
+    // Images in other formats are an alternative to the `source` that is there.
+    let alternatives = ["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds"];
+    extensions::check_carried(doc, others, &at, &alternatives)?;
+    doc.item(&doc.root.images, texture.source, &format!("{at}/source"), "images")?;
+    let (wrap_u, wrap_v, filter) = match texture.sampler {
+        None => (Wrap::Repeat, Wrap::Repeat, Filter::Bilinear),
+        Some(index) => sampler(loader, index, &format!("{at}/sampler"))?,
+    };
+    let image = loader.textures.image(texture.source.value());
+    let id = loader.builder.add_texture(Texture { image, wrap_u, wrap_v, filter });
+    loader.textures.read.insert(index.value(), id);
+    Ok(id)
+}
+
+/// Wrapping and magnification; textures are always read at level 0, so the minification filter does not matter.
+fn sampler(loader: &Loader, index: Index<Sampler>, pointer: &str) -> Result<(Wrap, Wrap, Filter)> {
+    let doc = loader.doc;
+    let sampler = doc.item(&doc.root.samplers, index, pointer, "samplers")?;
+    let at = format!("/samplers/{}", index.value());
+    let wrap = |mode: Checked<WrappingMode>, key: &str| match mode {
+        Checked::Valid(WrappingMode::Repeat) => Ok(Wrap::Repeat),
+        Checked::Valid(WrappingMode::MirroredRepeat) => Ok(Wrap::MirroredRepeat),
+        Checked::Valid(WrappingMode::ClampToEdge) => Ok(Wrap::ClampToEdge),
+        Checked::Invalid => {
+            let fix = "Allowed: 10497 (repeat), 33648 (mirrored repeat), 33071 (clamp to edge).";
+            Err(doc.bad(&format!("{at}/{key}"), "is not a wrapping mode", fix))
+        }
+    };
+    let filter = match sampler.mag_filter {
+        Some(Checked::Valid(MagFilter::Nearest)) => Filter::Nearest,
+        None | Some(Checked::Valid(MagFilter::Linear)) => Filter::Bilinear,
+        Some(Checked::Invalid) => {
+            let fix = "Allowed: 9728 (nearest), 9729 (linear).";
+            return Err(doc.bad(&format!("{at}/magFilter"), "is not a magnification filter", fix));
+        }
+    };
+    Ok((wrap(sampler.wrap_s, "wrapS")?, wrap(sampler.wrap_t, "wrapT")?, filter))
+}

@@ -1,0 +1,175 @@
+//! URIs to bytes or to files that may be read: relative paths below the input's own folder (or `--asset-root`).
+
+use super::document::Document;
+use super::locate::shorten;
+use super::{Result, base64};
+use crate::error::{LoadError, SourceLoc};
+use std::path::{Component, Path, PathBuf};
+
+/// What a URI stands for.
+pub(super) enum Source {
+    /// The payload of a data URI and its media type (may be empty).
+    Data(Vec<u8>, String),
+    /// A file that may be read.
+    File(PathBuf),
+}
+
+/// Where URIs may lead.
+pub(super) struct Resolver {
+    /// The input's folder, without links.
+    base: PathBuf,
+    /// The input's folder as the user sees it.
+    shown: PathBuf,
+    /// Files may be read below these, without links.
+    roots: Vec<PathBuf>,
+}
+
+impl Resolver {
+    /// For the URIs of `file`.
+    pub fn new(file: &Path, asset_root: Option<&Path>) -> Result<Self> {
+        let shown = match file.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let canonical = |path: &Path, what: &str, fix: &str| {
+            let why = |e| LoadError::new(SourceLoc::file(file), format!("{what} {}: {e}", path.display()), fix);
+            path.canonicalize().map_err(why)
+        };
+        let base = canonical(&shown, "the folder of the file", "")?;
+        let mut roots = vec![base.clone()];
+        if let Some(root) = asset_root {
+            roots.push(canonical(root, "--asset-root", "It must be a folder that exists.")?);
+        }
+        Ok(Self { base, shown, roots })
+    }
+}
+
+impl Document {
+    /// What the URI at `pointer` stands for. A file is proven to lie in an allowed folder, links followed.
+    pub fn resolve(&self, pointer: &str, uri: &str) -> Result<Source> {
+        if uri.get(..5).is_some_and(|s| s.eq_ignore_ascii_case("data:")) {
+            return self.data_uri(pointer, uri.get(5..).unwrap_or_default());
+        }
+        let refuse = |why: &str, fix: &str| Err(self.error(pointer, format!("\"{}\" {why}", shorten(uri)), fix));
+        const RELATIVE: &str = "Only relative paths below the file's own folder are read, or below --asset-root DIR.";
+        if uri.is_empty() {
+            return refuse("is empty", RELATIVE);
+        }
+        if let Some(scheme) = scheme(uri) {
+            return refuse(&format!("has the scheme \"{scheme}:\""), RELATIVE);
+        }
+        let path = match percent_decode(uri) {
+            Ok(path) => path,
+            Err(why) => return refuse(&why, "Write %25 for a percent sign."),
+        };
+        if path.contains('\\') {
+            return refuse("has a backslash", "Separate folders with / in a URI.");
+        }
+        if path.contains('\0') {
+            return refuse("has a zero byte", RELATIVE);
+        }
+        if path.starts_with('/') || scheme(&path).is_some() {
+            return refuse("is absolute", RELATIVE);
+        }
+        self.confine(pointer, uri, &path)
+    }
+
+    /// `path` below the input's folder, if it is in an allowed folder both as written and with links followed.
+    fn confine(&self, pointer: &str, uri: &str, path: &str) -> Result<Source> {
+        let outside = |how: &str| {
+            let roots: Vec<_> = self.uris.roots.iter().map(|r| r.display().to_string()).collect();
+            let fix = format!(
+                "Files are read only below {}. Move the file there, or name a folder above both with --asset-root DIR.",
+                roots.join(" and ")
+            );
+            self.error(pointer, format!("\"{}\" {how}", shorten(uri)), fix)
+        };
+        let allowed = |path: &Path| self.uris.roots.iter().any(|root| path.starts_with(root));
+        // First as written, so that nothing outside is even asked about.
+        let mut target = self.uris.base.clone();
+        for component in Path::new(path).components() {
+            match component {
+                Component::Normal(name) => target.push(name),
+                Component::CurDir => {}
+                Component::ParentDir => {
+                    target.pop();
+                }
+                Component::RootDir | Component::Prefix(_) => return Err(outside("is absolute")),
+            }
+        }
+        if !allowed(&target) {
+            return Err(outside("leaves the folder of the file"));
+        }
+        let real = target.canonicalize().map_err(|e| {
+            let shown = self.uris.shown.join(path);
+            let fix = "Put the file there, or correct the URI (upper and lower case count).";
+            self.error(pointer, format!("\"{}\": {}: {e}", shorten(uri), shown.display()), fix)
+        })?;
+        if !allowed(&real) {
+            return Err(outside("is a link that leaves the folder of the file"));
+        }
+        Ok(Source::File(real))
+    }
+
+    /// `[type][;parameters];base64,payload`.
+    fn data_uri(&self, pointer: &str, rest: &str) -> Result<Source> {
+        let fail = |why: String| {
+            self.error(pointer, format!("data URI: {why}"), "Allowed is data:[type];base64,DATA with padded base64.")
+        };
+        let Some((head, payload)) = rest.split_once(',') else {
+            return Err(fail(format!("no comma in \"{}\"", shorten(rest))));
+        };
+        let mut parts = head.split(';');
+        let media = parts.next().unwrap_or_default().to_owned();
+        if !parts.any(|p| p.eq_ignore_ascii_case("base64")) {
+            return Err(fail(format!("\"{}\" is not base64", shorten(head))));
+        }
+        base64::decode(payload.as_bytes()).map(|bytes| Source::Data(bytes, media)).map_err(fail)
+    }
+}
+
+/// The scheme of a URI (RFC 3986, section 3.1), if it has one. A drive letter counts as one.
+fn scheme(uri: &str) -> Option<&str> {
+    let (scheme, _) = uri.split_once(':')?;
+    let letters = scheme.starts_with(|c: char| c.is_ascii_alphabetic());
+    (letters && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))).then_some(scheme)
+}
+
+/// The text with `%xx` replaced by bytes, which must be UTF-8.
+fn percent_decode(uri: &str) -> std::result::Result<String, String> {
+    let mut out = Vec::with_capacity(uri.len());
+    let mut bytes = uri.bytes();
+    while let Some(byte) = bytes.next() {
+        if byte != b'%' {
+            out.push(byte);
+            continue;
+        }
+        let mut digit = || bytes.next().and_then(|c| char::from(c).to_digit(16));
+        match (digit(), digit()) {
+            (Some(high), Some(low)) => out.push((high * 16 + low) as u8),
+            _ => return Err("has a % that no two hexadecimal digits follow".into()),
+        }
+    }
+    String::from_utf8(out).map_err(|_| "is not UTF-8 when its %xx are replaced".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_escapes_decode_to_utf8_or_fail() {
+        assert_eq!(percent_decode("a%20b%C3%A9.png").unwrap(), "a b\u{e9}.png");
+        for bad in ["%", "%4", "%zz", "%ff"] {
+            assert!(percent_decode(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn schemes_are_told_from_file_names() {
+        assert_eq!(scheme("http://x/y"), Some("http"));
+        assert_eq!(scheme("C:/x"), Some("C"));
+        assert_eq!(scheme("a b:c.png"), None);
+        assert_eq!(scheme("x.png"), None);
+    }
+}

@@ -1,0 +1,140 @@
+//! One frame: prepare, trace, develop.
+
+use super::prepare::{Prepared, prepare};
+use super::{CropWindow, Filter, Frame, FrameCamera, Progress, RenderSettings, RenderStats, schedule};
+use crate::camera::{Camera, CameraRays, Projection};
+use crate::error::RenderError;
+use crate::film::{Film, PixelFilter, Tile};
+use crate::integrator::PathTracer;
+use crate::scene::Scene;
+use glam::{DMat4, DVec3};
+use simd::Level;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Renders camera `camera` of `scene` (an index into `scene.cameras`; a scene without cameras has one framed on its
+/// bounds, index 0).
+///
+/// # Errors
+/// The backend is not to be had, the scene is too large, or `progress.cancel` was set.
+///
+/// # Panics
+/// When `camera` is out of range, or the settings are (sizes, samples and lanes are checked by whoever made them).
+pub fn render(
+    scene: &Scene,
+    camera: usize,
+    settings: &RenderSettings,
+    progress: &Progress,
+) -> Result<Frame, RenderError> {
+    let threads = settings.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| RenderError::TooLarge(format!("cannot start {threads} threads: {e}")))?;
+    pool.install(|| render_here(scene, camera, settings, progress))
+}
+
+/// [`render`] on the current rayon pool.
+fn render_here(
+    scene: &Scene,
+    camera: usize,
+    settings: &RenderSettings,
+    progress: &Progress,
+) -> Result<Frame, RenderError> {
+    let (width, height) = (settings.width, settings.height);
+    assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
+    let start = Instant::now();
+    let prepared = prepare(scene, settings)?;
+    let build_seconds = start.elapsed().as_secs_f64();
+
+    let framed = framing_camera(&prepared, f64::from(width) / f64::from(height));
+    let camera = if scene.cameras.is_empty() { &framed } else { &scene.cameras[camera] };
+    let window = settings.crop.unwrap_or(CropWindow { x: 0, y: 0, width, height });
+    let film = Film::new(Tile { x: window.x, y: window.y, width: window.width, height: window.height }, settings.spp);
+    let level = match settings.lanes {
+        None => Level::best(),
+        Some(1) => Level::Scalar,
+        Some(8) => Level::best_of_8(),
+        Some(16) => Level::Avx512,
+        Some(n) => panic!("{n} lanes; allowed: 1, 8, 16"),
+    };
+    let tracer = PathTracer {
+        tables: &prepared.tables,
+        accel: &*prepared.accel,
+        camera: CameraRays::new(camera, width, height, prepared.origin),
+        filter: match settings.filter {
+            Filter::Box { width } => PixelFilter::Box { radius: 0.5 * width },
+            Filter::Tent { width } => PixelFilter::Tent { radius: 0.5 * width },
+        },
+        max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
+        is_capped: settings.max_bounces.is_none(),
+        seed: settings.seed,
+        frame: settings.frame,
+        level,
+    };
+    let paths = u64::from(window.width) * u64::from(window.height) * u64::from(settings.spp);
+    progress.total.store(paths, Ordering::Relaxed);
+    let start = Instant::now();
+    let totals = schedule::trace(&tracer, &film, progress);
+    if progress.cancel.load(Ordering::Relaxed) {
+        return Err(RenderError::Interrupted);
+    }
+    let pixels = film.mean();
+    let render_seconds = start.elapsed().as_secs_f64();
+
+    let mut warnings = prepared.warnings;
+    if totals.non_finite > 0 {
+        let places: Vec<_> = totals
+            .examples
+            .iter()
+            .map(|(x, y, s)| format!("pixel {x},{y} sample {s} seed {}", settings.seed))
+            .collect();
+        warnings.push(format!("{} samples were not finite and were dropped: {}", totals.non_finite, places.join("; ")));
+    }
+    let tables = &prepared.tables;
+    let stats = RenderStats {
+        build_seconds,
+        render_seconds,
+        camera_rays: totals.counters.camera,
+        bounce_rays: totals.counters.bounce,
+        shadow_rays: totals.counters.shadow,
+        non_finite_samples: totals.non_finite,
+        non_finite_examples: totals.examples,
+        truncated: totals.counters.truncated as f64 / paths as f64,
+        triangles: tables.triangles.len() as u64,
+        instances: scene.instances.len() as u64,
+        lights: tables.lights.len() as u64,
+        features: vec![
+            ("emissive_surfaces", tables.lights.has_triangles()),
+            ("punctual_lights", !scene.lights.is_empty()),
+            ("textures", !scene.textures.is_empty()),
+            ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
+            ("normal_maps", tables.triangles.has_tangents()),
+        ],
+        accel: prepared.accel_report,
+        lanes: level.lanes(),
+        warnings,
+    };
+    let Projection::Perspective { yfov, .. } = camera.projection;
+    let frame_camera = FrameCamera {
+        world_from_camera: camera.world_from_camera,
+        yfov,
+        aspect_ratio: f64::from(width) / f64::from(height),
+    };
+    Ok(Frame { width, height, window, pixels, spp: settings.spp, camera: frame_camera, stats })
+}
+
+/// A camera that sees the whole scene from the front, a little from above: for files without one.
+fn framing_camera(prepared: &Prepared, aspect: f64) -> Camera {
+    let (low, high) = prepared.bounds.unwrap_or((DVec3::splat(-1.0), DVec3::splat(1.0)));
+    let (centre, radius) = (0.5 * (low + high), (0.5 * (high - low).length()).max(1e-6));
+    let yfov: f64 = 40f64.to_radians();
+    // The sphere about the bounds must fit in both directions.
+    let half = (0.5 * yfov).min(((0.5 * yfov).tan() * aspect).atan());
+    let towards = DVec3::new(0.35, 0.3, 1.0).normalize();
+    let eye = centre + towards * (radius / half.sin());
+    let right = DVec3::Y.cross(towards).normalize();
+    let up = towards.cross(right);
+    let world_from_camera = DMat4::from_cols(right.extend(0.0), up.extend(0.0), towards.extend(0.0), eye.extend(1.0));
+    Camera { name: String::new(), world_from_camera, projection: Projection::Perspective { yfov, aspect_ratio: None } }
+}

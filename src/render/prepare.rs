@@ -1,0 +1,240 @@
+//! The seam: a scene's description becomes machinery. Everything conditional is decided here, once.
+
+use super::{AccelChoice, AccelReport, RenderSettings};
+use crate::accel::{Accel, Triangles, embree::EmbreeAccel, linear::Linear, wide::WideBvh};
+use crate::error::RenderError;
+use crate::integrator::SceneTables;
+use crate::light::Light;
+use crate::light::table::{LightTable, PreparedLight};
+use crate::material::table::MaterialTable;
+use crate::scene::{Instance, Scene};
+use crate::shape::Mesh;
+use crate::shape::table::{NONE, TriangleTable};
+use crate::texture::lookup::TextureTable;
+use glam::{DMat3, DVec3};
+
+/// A scene made ready to be traced.
+pub struct Prepared {
+    /// What shading reads.
+    pub tables: SceneTables,
+    /// What rays hit.
+    pub accel: Box<dyn Accel>,
+    /// Which backend and why.
+    pub accel_report: AccelReport,
+    /// World position of the prepared space's origin: the centre of the scene's bounds, so that f32 serves scenes far
+    /// from the world's origin as well.
+    pub origin: DVec3,
+    /// Bounds in world space; `None` without triangles.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Said to the user.
+    pub warnings: Vec<String>,
+}
+
+/// Triangles left out because flattening made them unusable.
+#[derive(Default)]
+struct Dropped {
+    without_area: usize,
+}
+
+/// Prepares `scene`.
+///
+/// # Errors
+/// The backend is not to be had, or the scene does not fit index types.
+pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, RenderError> {
+    let count = scene.triangle_count();
+    // Records are gathered by signed 32-bit indices, four a triangle.
+    if count > (i32::MAX / 4) as usize {
+        return Err(RenderError::TooLarge(format!("{count} triangles; at most {}", i32::MAX / 4)));
+    }
+    let bounds = bounds(scene);
+    let origin = bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    let textures = TextureTable::new(&scene.textures, &scene.images)?;
+    let materials = MaterialTable::new(&scene.materials);
+    let mut triangles = TriangleTable::with_capacity(count);
+    let mut geometry = Triangles::default();
+    let mut lights = Vec::new();
+    let mut dropped = Dropped::default();
+    for instance in &scene.instances {
+        flatten(scene, instance, origin, &mut geometry, &mut triangles, &mut lights, &mut dropped);
+    }
+    let mut warnings = Vec::new();
+    if dropped.without_area > 0 {
+        warnings.push(format!("{} triangles have no area once placed and were dropped", dropped.without_area));
+    }
+    let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
+    punctual(scene, origin, radius, &mut lights);
+    if lights.is_empty() {
+        warnings.push(String::from(
+            "nothing in the scene emits light, so the picture is black; add a light or an emissive material",
+        ));
+    }
+    let lights = LightTable::new(&lights, &mut triangles);
+    let (accel, accel_report) = build_accel(geometry, settings)?;
+    let tables = SceneTables { triangles, materials, textures, lights };
+    Ok(Prepared { tables, accel, accel_report, origin, bounds, warnings })
+}
+
+/// World bounds of everything placed.
+fn bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
+    let mut bounds: Option<(DVec3, DVec3)> = None;
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh.index()];
+        // Only vertices that a triangle uses.
+        for &i in mesh.indices.as_flattened() {
+            let p =
+                instance.world_from_object.transform_point3(glam::Vec3::from(mesh.positions[i as usize]).as_dvec3());
+            let (low, high) = bounds.get_or_insert((p, p));
+            (*low, *high) = (low.min(p), high.max(p));
+        }
+    }
+    bounds
+}
+
+/// Appends one instance in world space, recentred, vertices transformed in f64 and rounded once.
+fn flatten(
+    scene: &Scene,
+    instance: &Instance,
+    origin: DVec3,
+    geometry: &mut Triangles,
+    table: &mut TriangleTable,
+    lights: &mut Vec<(PreparedLight, f64)>,
+    dropped: &mut Dropped,
+) {
+    let mesh = &scene.meshes[instance.mesh.index()];
+    let material = scene.materials.get(mesh.material.index());
+    let linear = DMat3::from_mat4(instance.world_from_object);
+    // Normals go by the cofactor matrix: no division, so nearly singular transforms stay finite. A mirroring transform
+    // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
+    let mirrors = linear.determinant() < 0.0;
+    let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
+    let first = geometry.positions.len() as u32;
+    geometry.positions.extend(mesh.positions.iter().map(|&p| {
+        let p = instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
+        (p - origin).as_vec3().to_array()
+    }));
+    let average = material.map_or(0.0, |m| mean_emission(scene, m));
+    let needs_attributes = mesh.normals.is_some() || mesh.uvs.is_some();
+    for &[i, j, k] in &mesh.indices {
+        let [j, k] = if mirrors { [k, j] } else { [j, k] };
+        let corner = |v: u32| glam::Vec3::from(geometry.positions[(first + v) as usize]);
+        let corners = [corner(i), corner(j), corner(k)];
+        // In f64: the f32 product of edges below 3e-10 underflows.
+        let edges = corners.map(|c| c.as_dvec3());
+        let cross = (edges[1] - edges[0]).cross(edges[2] - edges[0]);
+        let area = 0.5 * cross.length();
+        if area == 0.0 || !area.is_finite() {
+            dropped.without_area += 1;
+            continue;
+        }
+        let ng = (cross / (2.0 * area)).as_vec3();
+        let attributes =
+            if needs_attributes { push_attributes(mesh, [i, j, k], normal_from_object, table) } else { NONE };
+        let tangents = mesh.tangents.as_ref().map_or(NONE, |t| {
+            table.push_tangents([i, j, k].map(|v| {
+                let [x, y, z, w] = t[v as usize];
+                let t = (linear * DVec3::new(f64::from(x), f64::from(y), f64::from(z))).normalize_or_zero().as_vec3();
+                [t.x, t.y, t.z, if mirrors { -w } else { w }]
+            }))
+        });
+        let primitive = geometry.indices.len() as u32;
+        geometry.indices.push([i, j, k].map(|v| first + v));
+        table.push(corners, ng, mesh.material.0, attributes, tangents);
+        if average > 0.0 {
+            let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
+            let power = average * area * sides * std::f64::consts::PI;
+            let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
+            lights.push((light, power));
+        }
+    }
+}
+
+/// Normals and texture coordinates of a triangle's corners.
+fn push_attributes(mesh: &Mesh, corners: [u32; 3], normal_from_object: DMat3, table: &mut TriangleTable) -> u32 {
+    let normals = mesh.normals.as_ref().map(|n| {
+        corners.map(|v| {
+            let n = glam::Vec3::from(n[v as usize]).as_dvec3();
+            (normal_from_object * n).normalize_or_zero().as_vec3()
+        })
+    });
+    let uvs = corners.map(|v| mesh.uvs.as_ref().map_or([0.0; 2], |uv| uv[v as usize]));
+    table.push_attributes(normals, uvs)
+}
+
+/// Matrix of cofactors: the inverse transpose times the determinant.
+fn cofactor(m: DMat3) -> DMat3 {
+    DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
+/// Mean over channels and texture of a material's emission, nits: what its share of the light samples follows. Positive
+/// wherever it emits at all.
+fn mean_emission(scene: &Scene, material: &crate::material::Material) -> f64 {
+    let factor = material.emission.factor.map(f64::from);
+    let Some(texture) = material.emission.texture else {
+        return factor.iter().sum::<f64>() / 3.0;
+    };
+    let image = &scene.images[scene.textures[texture.index()].image.index()];
+    let mut sums = [0.0; 3];
+    for texel in &image.texels {
+        for (sum, &byte) in sums.iter_mut().zip(texel) {
+            // The square is near enough to the sRGB curve for a sampling weight.
+            *sum += (f64::from(byte) / 255.0).powi(2);
+        }
+    }
+    let n = image.texels.len().max(1) as f64;
+    sums.iter().zip(factor).map(|(s, f)| s / n * f).sum::<f64>() / 3.0
+}
+
+/// Adds the punctual lights that shine at all.
+fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(PreparedLight, f64)>) {
+    use std::f64::consts::PI;
+    for placed in &scene.lights {
+        let place = placed.world_from_light.w_axis.truncate() - origin;
+        let axis = -placed.world_from_light.z_axis.truncate().normalize();
+        let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+        let position = place.as_vec3();
+        let (light, power) = match placed.light {
+            Light::Point { intensity } => {
+                (PreparedLight::Point { position, intensity, cone: None }, 4.0 * PI * mean(intensity))
+            }
+            Light::Spot { intensity, inner_cone, outer_cone } => {
+                let (inner, outer) = (f64::from(inner_cone).cos(), f64::from(outer_cone).cos());
+                let cone = Some((axis.as_vec3(), inner as f32, outer as f32));
+                let solid_angle = 2.0 * PI * (1.0 - 0.5 * (inner + outer));
+                (PreparedLight::Point { position, intensity, cone }, solid_angle * mean(intensity))
+            }
+            Light::Directional { illuminance } => (
+                PreparedLight::Directional { towards: (-axis).as_vec3(), illuminance },
+                PI * radius * radius * mean(illuminance),
+            ),
+        };
+        if power > 0.0 {
+            lights.push((light, power));
+        }
+    }
+}
+
+/// Chooses and builds the backend.
+fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
+    let requested = match settings.accel {
+        AccelChoice::Auto => "auto",
+        AccelChoice::Embree => "embree",
+        AccelChoice::Bvh => "bvh",
+        AccelChoice::Linear => "linear",
+    };
+    let mut note = String::new();
+    let accel: Box<dyn Accel> = match settings.accel {
+        AccelChoice::Linear => Box::new(Linear::new(geometry)),
+        AccelChoice::Bvh => Box::new(WideBvh::build(&geometry)),
+        AccelChoice::Embree => Box::new(EmbreeAccel::build(&geometry, &settings.embree_dirs)?),
+        AccelChoice::Auto => match EmbreeAccel::build(&geometry, &settings.embree_dirs) {
+            Ok(embree) => Box::new(embree),
+            Err(why) => {
+                note = why.to_string();
+                Box::new(WideBvh::build(&geometry))
+            }
+        },
+    };
+    let stats = accel.stats();
+    let report = AccelReport { requested, used: stats.name, version: stats.version, isa: stats.isa, note };
+    Ok((accel, report))
+}

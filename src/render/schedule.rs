@@ -1,0 +1,86 @@
+//! Units of work among threads: whoever is free takes the next one, and no result depends on who that was.
+
+use super::Progress;
+use crate::film::{Film, TileSums};
+use crate::integrator::{Counters, PathTracer, SampleSink, Unit, Worker};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Samples remembered by place when they had to be dropped.
+const EXAMPLES: usize = 4;
+
+/// What all workers counted together.
+#[derive(Debug, Default)]
+pub struct Totals {
+    /// Rays and events.
+    pub counters: Counters,
+    /// Samples dropped because a channel was not finite.
+    pub non_finite: u64,
+    /// The first few of them in the order of units: (x, y, sample).
+    pub examples: Vec<(u32, u32, u32)>,
+}
+
+/// Adds a unit's samples to its tile's sums.
+struct Sink<'a> {
+    unit: &'a Unit,
+    sums: TileSums,
+    non_finite: u64,
+    examples: Vec<(u32, u32, u32)>,
+}
+
+impl SampleSink for Sink<'_> {
+    #[inline]
+    fn add(&mut self, pixel: u32, radiance: [f32; 3]) {
+        self.sums.add(pixel, radiance);
+    }
+
+    #[cold]
+    fn drop_non_finite(&mut self, pixel: u32, sample: u32) {
+        self.non_finite += 1;
+        if self.examples.len() < EXAMPLES {
+            self.examples.push((self.unit.x + pixel % self.unit.width, self.unit.y + pixel / self.unit.width, sample));
+        }
+    }
+}
+
+/// Traces every unit of `film` on the threads of the current rayon pool. Ends early when `progress.cancel` is set.
+pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Totals {
+    let next = AtomicUsize::new(0);
+    let found = Mutex::new((Totals::default(), Vec::new()));
+    rayon::broadcast(|_| {
+        let mut worker = Worker::default();
+        let mut non_finite = 0;
+        let mut examples = Vec::new();
+        let mut rays_before = 0;
+        while !progress.cancel.load(Ordering::Relaxed) {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            if i >= film.units() {
+                break;
+            }
+            let (tile, samples) = film.unit(i);
+            let paths = tile.area() as u64 * u64::from(samples.end - samples.start);
+            let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples };
+            let mut sink = Sink { unit: &unit, sums: TileSums::new(&tile), non_finite: 0, examples: Vec::new() };
+            tracer.trace(&unit, &mut worker, &mut sink);
+            film.store(i, &sink.sums);
+            non_finite += sink.non_finite;
+            examples.extend(sink.examples.into_iter().map(|e| (i, e)));
+            let rays = worker.counters.camera + worker.counters.bounce + worker.counters.shadow;
+            progress.rays.fetch_add(rays - rays_before, Ordering::Relaxed);
+            rays_before = rays;
+            progress.done.fetch_add(paths, Ordering::Relaxed);
+        }
+        let mut found = found.lock().expect("no worker panics with the lock held");
+        let (totals, all) = &mut *found;
+        totals.counters.camera += worker.counters.camera;
+        totals.counters.bounce += worker.counters.bounce;
+        totals.counters.shadow += worker.counters.shadow;
+        totals.counters.truncated += worker.counters.truncated;
+        totals.non_finite += non_finite;
+        all.extend(examples);
+    });
+    let (mut totals, mut examples) = found.into_inner().expect("no worker panics with the lock held");
+    examples.sort_unstable();
+    totals.examples = examples.into_iter().take(EXAMPLES).map(|(_, e)| e).collect();
+    totals
+}
