@@ -104,8 +104,9 @@ pub fn plan(
         .collect();
     try_plan(inputs, template, cameras, &names).map_err(|clash| {
         const CANDIDATES: [&str; 6] = [
-            "{stem}.{camera}",
+            // By camera only after by folder: names of cameras differ by luck between files.
             "{parent}-{stem}",
+            "{stem}.{camera}",
             "{parent}-{stem}.{camera}",
             "{stem}-render",
             "{parent}/{stem}",
@@ -222,7 +223,7 @@ mod tests {
         let clash = refused(&["s/a.gltf", "t/a.gltf"]);
         assert!(clash.contains("s/a.gltf and t/a.gltf would both") && clash.contains("--name '{parent}-{stem}'"));
         let reserved = refused(&["s/batch.gltf"]);
-        assert!(reserved.contains("reserved") && reserved.contains("--name '{stem}.{camera}'"), "{reserved}");
+        assert!(reserved.contains("reserved") && reserved.contains("--name '{parent}-{stem}'"), "{reserved}");
         let cameras = outputs(&["s/a.gltf"], Some("{stem}"), &[&["Main", "Side"]]).unwrap_err();
         assert!(cameras.contains("several cameras"), "{cameras}");
         assert!(outputs(&["s/a.gltf", "s/a.Main.gltf"], None, &[&["Main", "Side"], &[]]).is_err());

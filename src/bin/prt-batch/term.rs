@@ -27,12 +27,22 @@ pub fn say(text: &str) {
 
 /// Prints an error to stderr.
 pub fn error(text: &str) {
-    say(&format!("error: {text}"));
+    say(&format!("error: {}", indented(text)));
+}
+
+/// `text` with every line after the first indented by two spaces, where it is not.
+fn indented(text: &str) -> String {
+    let line =
+        |line: &str| if line.starts_with(' ') || line.is_empty() { line.to_owned() } else { format!("  {line}") };
+    let mut lines = text.lines();
+    let first = lines.next().unwrap_or_default().to_owned();
+    lines.fold(first, |all, next| all + "\n" + &line(next))
 }
 
 /// An error of usage: nothing was rendered.
 pub fn usage(text: &str) -> ExitCode {
-    error(&format!("{text}\n\nFor more information, try '--help'."));
+    error(text);
+    say("\nFor more information, try '--help'.");
     ExitCode::from(2)
 }
 
@@ -114,7 +124,12 @@ impl Observer for Reporter {
             self.accel_said = true;
             let words = [Some(used), image.accel.version.as_deref(), image.accel.isa.as_deref()];
             let words: Vec<_> = words.into_iter().flatten().collect();
-            let note = if image.accel_note.is_empty() { String::new() } else { format!(" ({})", image.accel_note) };
+            // The last line of the note is its gist, those before say what was tried.
+            let note = match self.verbosity {
+                Verbosity::Verbose => indented(&image.accel_note),
+                _ => image.accel_note.lines().last().unwrap_or_default().to_owned(),
+            };
+            let note = if note.is_empty() { note } else { format!(" ({note})") };
             say(&format!("rays by {}{note}", words.join(" ")));
         }
         match image.status {
@@ -123,7 +138,7 @@ impl Observer for Reporter {
             other => say(&format!("{}: {}", image.input, status_word(other))),
         }
         for warning in &image.warnings {
-            say(&format!("warning: {}: {warning}", image.input));
+            say(&indented(&format!("warning: {}: {warning}", image.input)));
         }
         if self.verbosity == Verbosity::Verbose {
             self.details(image);

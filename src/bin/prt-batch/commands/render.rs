@@ -85,6 +85,8 @@ fn embree_dirs() -> Vec<PathBuf> {
         }
     }
     dirs.extend(std::env::current_dir().map(|folder| folder.join(".embree")));
+    let mut seen = std::collections::HashSet::new();
+    dirs.retain(|dir| seen.insert(dir.clone()));
     dirs
 }
 
