@@ -9,6 +9,7 @@ mod rng;
 
 use glam::{DVec3, Vec3};
 use meshes::{batch, grid, placed, random_soup, slivers, soup, sphere};
+use prt::accel::front::{Front, Split};
 use prt::accel::linear::Linear;
 use prt::accel::wide::WideBvh;
 use prt::accel::{Accel, HitBatch, MISS, Triangles};
@@ -32,6 +33,15 @@ fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
     let mut all: Vec<(&'static str, Box<dyn Accel>)> = vec![("bvh portable", Box::new(portable))];
     if Level::Avx2.is_available() {
         all.push(("bvh avx2", Box::new(WideBvh::with_level(triangles, Level::Avx2))));
+    }
+    for (name, level) in
+        [("front portable", Level::Portable8), ("front avx2", Level::Avx2), ("front avx512", Level::Avx512)]
+    {
+        let Split { front, rest, rest_primitive } = Split::new(triangles.clone());
+        if let (true, Some(big)) = (level.is_available(), front) {
+            let behind = Box::new(WideBvh::build(&rest));
+            all.push((name, Box::new(Front::new(big, behind, &rest, rest_primitive).with_level(level))));
+        }
     }
     all
 }

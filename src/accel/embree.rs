@@ -72,6 +72,7 @@ impl Accel for EmbreeAccel {
             version: device.version().to_string(),
             isa: device.isa().to_owned(),
             bytes: device.memory_bytes(),
+            front: 0,
         }
     }
 }

@@ -52,6 +52,6 @@ impl Accel for Linear {
 
     fn stats(&self) -> AccelStats {
         let bytes = size_of_val(&*self.triangles.positions) + size_of_val(&*self.triangles.indices);
-        AccelStats { name: "linear", version: String::new(), isa: "scalar".into(), bytes }
+        AccelStats { name: "linear", version: String::new(), isa: "scalar".into(), bytes, front: 0 }
     }
 }

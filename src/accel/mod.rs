@@ -5,6 +5,7 @@
 
 mod batch;
 pub mod embree;
+pub mod front;
 pub mod linear;
 pub mod wide;
 mod woop;
@@ -28,6 +29,11 @@ impl Triangles {
     pub fn corners(&self, i: usize) -> [glam::Vec3; 3] {
         self.indices[i].map(|v| glam::Vec3::from_array(self.positions[v as usize]))
     }
+
+    /// The corners of all triangles, one after the other.
+    pub fn positions_in_use(&self) -> impl Iterator<Item = glam::Vec3> {
+        self.indices.as_flattened().iter().map(|&v| glam::Vec3::from_array(self.positions[v as usize]))
+    }
 }
 
 /// What a backend says about itself, for logs and JSON.
@@ -41,6 +47,8 @@ pub struct AccelStats {
     pub isa: String,
     /// Bytes held, as far as known.
     pub bytes: usize,
+    /// Big triangles that are tested by packets of rays before the backend.
+    pub front: usize,
 }
 
 /// A built acceleration structure. Called once per batch of about 2000 rays, so `dyn` costs nothing here.

@@ -48,6 +48,8 @@ pub struct AccelReport {
     pub isa: String,
     /// Why `auto` did not take Embree; empty if it did.
     pub note: String,
+    /// Big triangles tested by packets of rays before the backend.
+    pub front_triangles: u64,
 }
 
 /// Counts and times of one frame.

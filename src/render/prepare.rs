@@ -1,7 +1,8 @@
 //! The seam: a scene's description becomes machinery. Everything conditional is decided here, once.
 
 use super::{AccelChoice, AccelReport, RenderSettings};
-use crate::accel::{Accel, Triangles, embree::EmbreeAccel, linear::Linear, wide::WideBvh};
+use crate::accel::front::{Front, Split};
+use crate::accel::{Accel, AccelStats, Triangles, embree::EmbreeAccel, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::SceneTables;
 use crate::light::Light;
@@ -222,19 +223,34 @@ fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dy
         AccelChoice::Linear => "linear",
     };
     let mut note = String::new();
-    let accel: Box<dyn Accel> = match settings.accel {
-        AccelChoice::Linear => Box::new(Linear::new(geometry)),
-        AccelChoice::Bvh => Box::new(WideBvh::build(&geometry)),
-        AccelChoice::Embree => Box::new(EmbreeAccel::build(&geometry, &settings.embree_dirs)?),
-        AccelChoice::Auto => match EmbreeAccel::build(&geometry, &settings.embree_dirs) {
+    if settings.accel == AccelChoice::Linear {
+        let accel: Box<dyn Accel> = Box::new(Linear::new(geometry));
+        let report = report(&*accel, requested, note);
+        return Ok((accel, report));
+    }
+    let Split { front, rest, rest_primitive } = Split::new(geometry);
+    let behind: Box<dyn Accel> = match settings.accel {
+        AccelChoice::Linear => unreachable!("returned above"),
+        AccelChoice::Bvh => Box::new(WideBvh::build(&rest)),
+        AccelChoice::Embree => Box::new(EmbreeAccel::build(&rest, &settings.embree_dirs)?),
+        AccelChoice::Auto => match EmbreeAccel::build(&rest, &settings.embree_dirs) {
             Ok(embree) => Box::new(embree),
             Err(why) => {
                 note = why.to_string();
-                Box::new(WideBvh::build(&geometry))
+                Box::new(WideBvh::build(&rest))
             }
         },
     };
-    let stats = accel.stats();
-    let report = AccelReport { requested, used: stats.name, version: stats.version, isa: stats.isa, note };
+    let accel = match front {
+        Some(big) => Box::new(Front::new(big, behind, &rest, rest_primitive)),
+        None => behind,
+    };
+    let report = report(&*accel, requested, note);
     Ok((accel, report))
+}
+
+/// What is said about the backend in use.
+fn report(accel: &dyn Accel, requested: &'static str, note: String) -> AccelReport {
+    let AccelStats { name, version, isa, front, .. } = accel.stats();
+    AccelReport { requested, used: name, version, isa, note, front_triangles: front as u64 }
 }

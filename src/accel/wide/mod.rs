@@ -87,6 +87,7 @@ impl Accel for WideBvh {
             version: String::new(),
             isa: self.level.name().into(),
             bytes: size_of_val(&*self.nodes) + size_of_val(&*self.leaves.data),
+            front: 0,
         }
     }
 }
