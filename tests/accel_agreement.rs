@@ -27,13 +27,13 @@ fn backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
 
 /// Those that need not look at every triangle.
 fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
-    let portable = WideBvh::with_level(triangles, Level::Portable8);
-    portable.validate(triangles).expect("a sound tree");
-    let mut all: Vec<(&'static str, Box<dyn Accel>)> = vec![("bvh portable", Box::new(portable))];
-    if Level::Avx2.is_available() {
-        all.push(("bvh avx2", Box::new(WideBvh::with_level(triangles, Level::Avx2))));
-    }
-    all
+    let levels = [Level::Portable8, Level::Scalar, Level::Avx2, Level::Avx512];
+    let build = |level: Level| {
+        let bvh = WideBvh::with_level(triangles, level);
+        bvh.validate(triangles).expect("a sound tree");
+        (level.name(), Box::new(bvh) as Box<dyn Accel>)
+    };
+    levels.into_iter().filter(|level| level.is_available()).map(build).collect()
 }
 
 /// Nearest hits as (primitive, t, u, v) by bits, after checking that `occluded` says the same about every ray.
@@ -43,6 +43,13 @@ fn trace(name: &str, accel: &dyn Accel, rays: &[Ray]) -> Vec<(u32, [u32; 3])> {
     let mut occluded = vec![2; rays.len()];
     accel.intersect(&rays_in, 0..rays.len(), false, &mut hits);
     accel.occluded(&rays_in, rays.len(), &mut occluded);
+    // Camera rays may be traced in another way, to the same hits.
+    let mut coherent = HitBatch::new(rays.len());
+    accel.intersect(&rays_in, 0..rays.len(), true, &mut coherent);
+    for (i, ray) in rays.iter().enumerate() {
+        let bits = |hits: &HitBatch| (hits.primitive[i], [hits.t[i], hits.u[i], hits.v[i]].map(f32::to_bits));
+        assert_eq!(bits(&coherent), bits(&hits), "{name}: the coherent hint changes the hit of {ray:?}");
+    }
     (0..rays.len())
         .map(|i| {
             let hit = hits.primitive[i] != MISS;
