@@ -2,6 +2,9 @@
 //!
 //! After Wald, Slusallek, Benthin and Wagner 2001, "Interactive Rendering with Coherent Ray Tracing". A packet's rays
 //! must share the signs of their directions and the largest component; packets that do not are left to `traverse`.
+//!
+//! 38 Mray/s against 11 with single rays in a room of 910 triangles (example `rays`), but only 1.2 to 1.3 times as fast
+//! with 500 000 triangles, where few rays of a packet share a leaf.
 
 use super::WideBvh;
 use super::leaf::{cross, sheared};
