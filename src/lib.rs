@@ -10,6 +10,7 @@ pub mod accel;
 pub mod batch;
 pub mod camera;
 pub mod color;
+pub mod compare;
 pub mod error;
 pub mod film;
 pub mod image;

@@ -1,3 +1,7 @@
-//! Pictures in files.
+//! Picture files: textures in, EXR and PNG out (always to memory first: [`crate::batch`] puts bytes on disk), EXR in.
 
 pub mod decode;
+pub mod exr;
+mod exr_header;
+pub mod exr_read;
+pub mod png;

@@ -57,7 +57,7 @@ pub enum PreparedLight {
 /// |---|---|---|
 /// | 0 | corner, position or direction towards the light | kind |
 /// | 1 | edge 1, or the spot's axis | pmf |
-/// | 2 | edge 2, or the spot's scale and offset | pmf / area |
+/// | 2 | edge 2, or the spot's scale and outer cosine | pmf / area |
 /// | 3 | intensity or illuminance | material |
 /// | 4 | unit normal | offset length |
 /// | 5 | attributes | - |
@@ -122,21 +122,20 @@ impl LightTable {
                     record(corners[1] - corners[0], pmf32),
                     record(corners[2] - corners[0], density),
                     record(zero, f32::from_bits(material)),
-                    record(ng, ng.abs().dot(max_abs) * robust::gamma(16)),
+                    record(ng, ng.abs().element_sum() * max_abs.max_element() * robust::gamma(16)),
                     [f32::from_bits(attributes), 0.0, 0.0, 0.0],
                 ]);
                 self.has_triangles = true;
             }
             PreparedLight::Point { position, intensity, cone } => {
-                // KHR_lights_punctual: attenuation = clamp(cos x scale + offset)^2.
-                let (axis, scale, offset) = cone.map_or((zero, 0.0, 1.0), |(axis, inner, outer)| {
-                    let scale = 1.0 / (inner - outer).max(0.001);
-                    (axis, scale, -outer * scale)
-                });
+                // KHR_lights_punctual: attenuation = clamp((cos - cos outer) / (cos inner - cos outer))^2. Its sample code
+                // takes at least 0.001 for the difference, which would dim narrow cones inside the inner angle.
+                let (axis, scale, outer) = cone
+                    .map_or((zero, 0.0, 1.0), |(axis, inner, outer)| (axis, 1.0 / (inner - outer).max(1e-6), outer));
                 self.records.extend([
                     record(position, kind(if cone.is_some() { SPOT } else { POINT })),
                     record(axis, pmf32),
-                    [scale, offset, 0.0, 0.0],
+                    [scale, outer, 0.0, 0.0],
                     record(glam::Vec3::from_array(intensity), 0.0),
                     [0.0; 4],
                     [0.0; 4],
@@ -286,7 +285,7 @@ fn sample_punctual<L: Lanes>(p: V3<L>, record: &[[L::F; 4]; 4], kind: L::U) -> L
     let distance2 = to_light.dot(to_light);
     let wi = place.or_else(is_distant, to_light.scale(one / distance2.sqrt()));
     let cos = -(xyz::<L>(&record[1]).dot(wi));
-    let falloff = cos.mul_add(record[2][0], record[2][1]).max(zero).min(one);
+    let falloff = ((cos - record[2][1]) * record[2][0]).max(zero).min(one);
     let attenuation = (falloff * falloff).or_else(kind.eq(L::U::splat(SPOT)), one);
     let scale = one.or_else(is_distant, attenuation / distance2);
     let radiance = xyz::<L>(&record[3]).scale(scale);

@@ -65,11 +65,11 @@ pub fn sobol_4d<L: Lanes>(pixel: L::U, index: L::U, group: L::U) -> [L::F; 4] {
 
     let zero = L::U::splat(0);
     let (mut x1, mut x2, mut x3) = (zero, zero, zero);
-    for bit in 0..INDEX_BITS as usize {
+    for bit in 0..INDEX_BITS {
         let set = shuffled.has(1 << bit);
-        x1 = x1 ^ L::U::splat(COLUMNS[0][bit]).or_else(set, zero);
-        x2 = x2 ^ L::U::splat(COLUMNS[1][bit]).or_else(set, zero);
-        x3 = x3 ^ L::U::splat(COLUMNS[2][bit]).or_else(set, zero);
+        x1 = x1 ^ L::U::splat(COLUMNS[0][bit as usize]).or_else(set, zero);
+        x2 = x2 ^ L::U::splat(COLUMNS[1][bit as usize]).or_else(set, zero);
+        x3 = x3 ^ L::U::splat(COLUMNS[2][bit as usize]).or_else(set, zero);
     }
     // A seed per dimension: one for all would correlate them.
     [

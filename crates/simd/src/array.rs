@@ -114,9 +114,9 @@ fn clamped(i: u32, len: usize) -> usize {
 fn compress<T: Copy, const K: usize>(src: [T; K], keep: M<K>, dst: &mut [T], at: usize) {
     let dst = &mut dst[at..at + K];
     let mut n = 0;
-    for i in 0..K {
-        dst[n] = src[i];
-        n += (keep.0[i] & 1) as usize;
+    for (value, keep) in src.into_iter().zip(keep.0) {
+        dst[n] = value;
+        n += (keep & 1) as usize;
         if n == K {
             break;
         }

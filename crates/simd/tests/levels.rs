@@ -46,7 +46,8 @@ impl<Op: Binary> Kernel for Map<'_, Op> {
 fn check(name: &str, op: impl Binary + Copy, reference: impl Fn(u32, u32) -> u32) {
     let mut rng = Rng(12345);
     // Floats of every kind turn up among random bits; moderate ones are mixed in so that sums are not all NaN.
-    let mut random = |i: usize| if i % 2 == 0 { rng.next() } else { (rng.next() as f32 / 1e8 - 20.0).to_bits() };
+    let mut random =
+        |i: usize| if i.is_multiple_of(2) { rng.next() } else { (rng.next() as f32 / 1e8 - 20.0).to_bits() };
     let a: Vec<u32> = (0..COUNT).map(&mut random).collect();
     let b: Vec<u32> = (0..COUNT).map(&mut random).collect();
     for level in levels() {
@@ -146,15 +147,13 @@ impl Kernel for Tables<'_> {
             let (mut g, mut r) = ([0.0; 16], [[0.0; 16]; 4]);
             i.gather(self.table).store(&mut g, 0);
             let columns = i.records(self.records);
-            for c in 0..4 {
-                columns[c].store(&mut r[c], 0);
+            for (column, out) in columns.iter().zip(&mut r) {
+                column.store(out, 0);
             }
             for lane in 0..L::N {
                 let k = self.index[at + lane] as usize;
                 assert_eq!(g[lane], self.table[k.min(self.table.len() - 1)]);
-                for c in 0..4 {
-                    assert_eq!(r[c][lane], self.records[k.min(self.records.len() - 1)][c]);
-                }
+                assert_eq!(r.map(|column| column[lane]), self.records[k.min(self.records.len() - 1)]);
             }
         }
     }

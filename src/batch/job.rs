@@ -1,0 +1,240 @@
+//! Which cameras of which inputs go to which output names; clashes are found before anything is rendered.
+
+use super::input::{Input, extension_rank};
+use super::names::{NameFields, NameTemplate, camera_labels};
+use super::peek;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Which cameras of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum CameraChoice {
+    /// Every one; of a file without cameras, the one framed on its bounds.
+    #[default]
+    All,
+    /// One by its place.
+    Index(usize),
+    /// One by its name.
+    Name(String),
+}
+
+impl CameraChoice {
+    /// The chosen of the cameras called `names`, as indices.
+    ///
+    /// # Errors
+    /// There is no such camera; the text says which there are.
+    pub fn select(&self, names: &[String]) -> Result<Vec<usize>, String> {
+        // A file without cameras has one, framed on its bounds.
+        let count = names.len().max(1);
+        let found = match self {
+            Self::All => return Ok((0..count).collect()),
+            Self::Index(index) => (*index < count).then_some(*index),
+            Self::Name(name) => names.iter().position(|n| n == name),
+        };
+        found.map(|index| vec![index]).ok_or_else(|| {
+            let wanted = match self {
+                Self::Index(index) => index.to_string(),
+                Self::Name(name) => format!("{name:?}"),
+                Self::All => unreachable!("all cameras are always found"),
+            };
+            let list: Vec<_> = names.iter().enumerate().map(|(i, name)| format!("{i} {name:?}")).collect();
+            let there = if list.is_empty() { "0, framed on the bounds".into() } else { list.join(", ") };
+            format!("--camera {wanted}: there is no such camera\n  The scene has: {there}.")
+        })
+    }
+}
+
+/// How the outputs of one input are named.
+#[derive(Clone, Debug)]
+pub struct Naming {
+    folder: PathBuf,
+    stem: String,
+    parent: String,
+    template: Option<NameTemplate>,
+}
+
+impl Naming {
+    /// Output path without extension, below the output folder, of the camera called `label`; `several` cameras of the
+    /// file are rendered.
+    pub fn output(&self, label: &str, several: bool) -> PathBuf {
+        let name = match &self.template {
+            Some(template) => template.fill(&NameFields { stem: &self.stem, parent: &self.parent, camera: label }),
+            None if several => format!("{}.{label}", self.stem),
+            None => self.stem.clone(),
+        };
+        self.folder.join(name)
+    }
+
+    /// Outputs of the cameras `chosen` out of those called `names`.
+    pub fn outputs(&self, names: &[String], chosen: &[usize]) -> Vec<PathBuf> {
+        let labels = labels_of(names);
+        chosen.iter().map(|&i| self.output(&labels[i], chosen.len() > 1)).collect()
+    }
+}
+
+/// One label per camera; a file without cameras has one, called `0`.
+fn labels_of(names: &[String]) -> Vec<String> {
+    if names.is_empty() { vec!["0".into()] } else { camera_labels(names) }
+}
+
+/// Output names of every input, and the input (by index) to which each name belongs.
+#[derive(Clone, Debug, Default)]
+pub struct Plan {
+    /// For each input.
+    pub namings: Vec<Naming>,
+    /// Output path without extension to input.
+    pub owners: HashMap<PathBuf, usize>,
+}
+
+/// Names for the outputs of all `inputs`.
+///
+/// # Errors
+/// Two images would write one file, or a name is reserved: says which, and the `--name` that would tell them apart.
+pub fn plan(
+    inputs: &[Input],
+    template: Option<&NameTemplate>,
+    cameras: &CameraChoice,
+    scene: Option<&str>,
+) -> Result<Plan, String> {
+    let names: Vec<Vec<String>> = (inputs.iter())
+        .map(|input| match input.problem {
+            Some(_) => Vec::new(),
+            None => peek::camera_names(&input.path, scene).unwrap_or_default(),
+        })
+        .collect();
+    try_plan(inputs, template, cameras, &names).map_err(|clash| {
+        const CANDIDATES: [&str; 6] = [
+            // By camera only after by folder: names of cameras differ by luck between files.
+            "{parent}-{stem}",
+            "{stem}.{camera}",
+            "{parent}-{stem}.{camera}",
+            "{stem}-render",
+            "{parent}/{stem}",
+            "{parent}/{stem}.{camera}",
+        ];
+        let works = |candidate: &&&str| {
+            let candidate = NameTemplate::parse(candidate).expect("the candidates are valid templates");
+            try_plan(inputs, Some(&candidate), cameras, &names).is_ok()
+        };
+        match CANDIDATES.iter().find(works) {
+            Some(name) => format!("{clash}\n  Use --name '{name}' to tell them apart."),
+            None => format!("{clash}\n  Render them in separate runs with different --out."),
+        }
+    })
+}
+
+fn try_plan(
+    inputs: &[Input],
+    template: Option<&NameTemplate>,
+    cameras: &CameraChoice,
+    names: &[Vec<String>],
+) -> Result<Plan, String> {
+    let mut plan = Plan::default();
+    for (index, input) in inputs.iter().enumerate() {
+        let naming = naming(input, inputs, template);
+        if input.problem.is_none() {
+            // A camera that is not there fails this file later; it writes under one name all the same.
+            let chosen = cameras.select(&names[index]).unwrap_or_else(|_| vec![0]);
+            for output in naming.outputs(&names[index], &chosen) {
+                check_reserved(&output, &input.path)?;
+                if let Some(other) = plan.owners.insert(output.clone(), index) {
+                    let (output, path) = (output.display(), input.path.display());
+                    return Err(if other == index {
+                        format!("{path}: several cameras would be written to one name, {output}")
+                    } else {
+                        let other = inputs[other].path.display();
+                        format!("{other} and {path} would both be written to {output}")
+                    });
+                }
+            }
+        }
+        plan.namings.push(naming);
+    }
+    Ok(plan)
+}
+
+/// `batch.json` and `index.html` at the top of the output folder belong to the run.
+fn check_reserved(output: &Path, input: &Path) -> Result<(), String> {
+    match output.to_str() {
+        Some(name @ ("batch" | "index")) => {
+            Err(format!("{}: the output name {name:?} is reserved for the run's own report", input.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn naming(input: &Input, inputs: &[Input], template: Option<&NameTemplate>) -> Naming {
+    let text = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut stem = text(input.path.file_stem());
+    // A type that comes later in the list than another of the same stem adds its extension.
+    let shadowed = inputs.iter().any(|other| {
+        other.folder == input.folder
+            && other.path.parent() == input.path.parent()
+            && other.path.file_stem() == input.path.file_stem()
+            && extension_rank(&other.path) < extension_rank(&input.path)
+            && other.problem.is_none()
+    });
+    if template.is_none() && shadowed {
+        stem = text(input.path.file_name());
+    }
+    let parent = std::path::absolute(&input.path).unwrap_or_else(|_| input.path.clone());
+    let parent = parent.parent().map(|p| p.canonicalize().unwrap_or_else(|_| p.to_owned())).unwrap_or_default();
+    Naming { folder: input.folder.clone(), stem, parent: text(parent.file_name()), template: template.cloned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input(path: &str) -> Input {
+        Input { path: path.into(), folder: PathBuf::new(), problem: None }
+    }
+
+    fn outputs(paths: &[&str], template: Option<&str>, cameras: &[&[&str]]) -> Result<Vec<String>, String> {
+        let inputs: Vec<_> = paths.iter().map(|p| input(p)).collect();
+        let template = template.map(|t| NameTemplate::parse(t).unwrap());
+        let names: Vec<Vec<String>> = cameras.iter().map(|c| c.iter().map(|n| n.to_string()).collect()).collect();
+        let plan = try_plan(&inputs, template.as_ref(), &CameraChoice::All, &names)?;
+        let outputs = plan.namings.iter().zip(&names);
+        let all = |names: &[String]| CameraChoice::All.select(names).unwrap();
+        Ok(outputs.flat_map(|(n, names)| n.outputs(names, &all(names))).map(|p| p.to_str().unwrap().into()).collect())
+    }
+
+    #[test]
+    fn one_camera_takes_the_stem_and_several_add_theirs() {
+        assert_eq!(outputs(&["s/a.gltf"], None, &[&[]]).unwrap(), ["a"]);
+        assert_eq!(outputs(&["s/a.gltf"], None, &[&["Main"]]).unwrap(), ["a"]);
+        assert_eq!(outputs(&["s/a.b.gltf"], None, &[&["Main", ""]]).unwrap(), ["a.b.Main", "a.b.1"]);
+        assert_eq!(outputs(&["s/a.gltf"], Some("{parent}-{camera}"), &[&[]]).unwrap(), ["s-0"]);
+    }
+
+    #[test]
+    fn another_type_of_the_same_stem_adds_its_extension() {
+        assert_eq!(outputs(&["s/a.glb", "s/a.gltf"], None, &[&[], &[]]).unwrap(), ["a.glb", "a"]);
+        assert!(outputs(&["s/a.glb", "t/a.gltf"], None, &[&[], &[]]).is_err());
+    }
+
+    #[test]
+    fn clashes_and_reserved_names_are_refused_with_a_name_that_works() {
+        let refused = |paths: &[&str]| {
+            let inputs: Vec<_> = paths.iter().map(|p| input(p)).collect();
+            plan(&inputs, None, &CameraChoice::All, None).unwrap_err()
+        };
+        let clash = refused(&["s/a.gltf", "t/a.gltf"]);
+        assert!(clash.contains("s/a.gltf and t/a.gltf would both") && clash.contains("--name '{parent}-{stem}'"));
+        let reserved = refused(&["s/batch.gltf"]);
+        assert!(reserved.contains("reserved") && reserved.contains("--name '{parent}-{stem}'"), "{reserved}");
+        let cameras = outputs(&["s/a.gltf"], Some("{stem}"), &[&["Main", "Side"]]).unwrap_err();
+        assert!(cameras.contains("several cameras"), "{cameras}");
+        assert!(outputs(&["s/a.gltf", "s/a.Main.gltf"], None, &[&["Main", "Side"], &[]]).is_err());
+    }
+
+    #[test]
+    fn a_missing_camera_lists_those_that_are_there() {
+        let names = ["Main".to_string(), String::new()];
+        assert_eq!(CameraChoice::Name("Main".into()).select(&names).unwrap(), [0]);
+        assert_eq!(CameraChoice::Index(0).select(&[]).unwrap(), [0]);
+        let error = CameraChoice::Index(2).select(&names).unwrap_err();
+        assert!(error.contains("--camera 2") && error.contains("0 \"Main\", 1 \"\""), "{error}");
+    }
+}

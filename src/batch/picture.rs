@@ -1,0 +1,155 @@
+//! A [`Frame`] as the bytes of files.
+
+use crate::color::ToneMap;
+use crate::image::exr::{self, ExrCamera, ExrCompression, ExrPicture, ExrValue};
+use crate::image::png;
+use crate::render::{Brdf, Frame, RenderSettings};
+
+/// Which files, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct FileOptions {
+    /// Write the EXR.
+    pub exr: bool,
+    /// Write the PNG.
+    pub png: bool,
+    /// Of the EXR.
+    pub compression: ExrCompression,
+    /// Of the PNG.
+    pub tone: ToneMap,
+}
+
+impl Default for FileOptions {
+    fn default() -> Self {
+        Self { exr: true, png: true, compression: ExrCompression::default(), tone: ToneMap::default() }
+    }
+}
+
+/// The bytes of the EXR.
+///
+/// # Errors
+/// See [`exr::encode`].
+pub(super) fn exr_bytes(
+    frame: &Frame,
+    settings: &RenderSettings,
+    compression: ExrCompression,
+) -> Result<Vec<u8>, String> {
+    let window = frame.window;
+    let camera = ExrCamera {
+        world_from_camera: frame.camera.world_from_camera,
+        yfov: frame.camera.yfov,
+        aspect_ratio: frame.camera.aspect_ratio,
+    };
+    let picture = ExrPicture {
+        display_size: [frame.width, frame.height],
+        origin: [window.x, window.y],
+        size: [window.width, window.height],
+        pixels: &frame.pixels,
+        camera,
+        attributes: attributes(frame, settings),
+    };
+    exr::encode(&picture, compression)
+}
+
+/// The bytes of the PNG, and how many channels of its pixels were NaN.
+pub(super) fn png_bytes(frame: &Frame, tone: &ToneMap) -> (Vec<u8>, u64) {
+    let mut nan_channels = 0;
+    let mut rgb = Vec::with_capacity(frame.pixels.len() * 3);
+    for &radiance in &frame.pixels {
+        let (color, nan) = tone.apply(radiance);
+        rgb.extend_from_slice(&color);
+        nan_channels += u64::from(nan);
+    }
+    (png::encode(&rgb, frame.window.width, frame.window.height), nan_channels)
+}
+
+/// The `prt:` attributes. Only what determines the pixels, so that equal renders have equal bytes: no times, paths,
+/// host, threads.
+fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, ExrValue)> {
+    let stats = &frame.stats;
+    vec![
+        ("prt:version", ExrValue::Text(crate::VERSION.into())),
+        // Text, because EXR has no 64-bit integer.
+        ("prt:seed", ExrValue::Text(settings.seed.to_string())),
+        ("prt:spp", ExrValue::Int(i32::try_from(frame.spp).unwrap_or(i32::MAX))),
+        ("prt:accel", ExrValue::Text(stats.accel.used.into())),
+        ("prt:integrator", ExrValue::Text("path".into())),
+        ("prt:brdf", ExrValue::Text(brdf_name(settings.brdf).into())),
+        ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
+        ("prt:truncated", ExrValue::Double(stats.truncated)),
+        ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
+    ]
+}
+
+/// The option's value that names a model.
+fn brdf_name(brdf: Brdf) -> &'static str {
+    match brdf {
+        Brdf::AppendixB => "appendix-b",
+    }
+}
+
+/// What biases the picture and why; `no` if nothing does.
+fn bias_of(frame: &Frame, settings: &RenderSettings) -> String {
+    let mut reasons = Vec::new();
+    if let Some(bounces) = settings.max_bounces {
+        reasons.push(format!("paths end after {bounces} scatterings (--max-bounces)"));
+    }
+    if frame.stats.truncated > 0.0 {
+        let (share, cap) = (frame.stats.truncated, RenderSettings::BOUNCE_CAP);
+        reasons.push(format!("a share of {share:e} of the paths was cut at the cap of {cap} scatterings"));
+    }
+    if frame.stats.non_finite_samples > 0 {
+        reasons.push(format!("{} non-finite samples were dropped", frame.stats.non_finite_samples));
+    }
+    if reasons.is_empty() { "no".into() } else { reasons.join("; ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::exr_read;
+    use crate::render::{AccelReport, CropWindow, FrameCamera, RenderStats};
+
+    fn frame() -> Frame {
+        let stats = RenderStats {
+            accel: AccelReport { requested: "auto", used: "bvh", ..AccelReport::default() },
+            ..RenderStats::default()
+        };
+        let camera = FrameCamera { world_from_camera: glam::DMat4::IDENTITY, yfov: 1.0, aspect_ratio: 2.0 };
+        let window = CropWindow { x: 3, y: 2, width: 2, height: 1 };
+        let pixels = vec![[0.25, 0.5, 1.0], [f32::NAN, f32::INFINITY, -1.0]];
+        Frame { width: 8, height: 4, window, pixels, spp: 16, camera, stats }
+    }
+
+    #[test]
+    fn files_hold_the_window_of_the_frame() {
+        let frame = frame();
+        let bytes = exr_bytes(&frame, &RenderSettings::default(), ExrCompression::Zip).unwrap();
+        let read = exr_read::decode(&bytes).unwrap();
+        assert_eq!((read.origin, read.width, read.height), ([3, 2], 2, 1));
+        assert_eq!(read.pixels[0], frame.pixels[0]);
+        let (png, nan) = png_bytes(&frame, &ToneMap::default());
+        assert_eq!(nan, 1);
+        let png = image::load_from_memory(&png).unwrap().into_rgb8();
+        assert_eq!((png.width(), png.height()), (2, 1));
+    }
+
+    #[test]
+    fn attributes_are_those_of_the_contract() {
+        let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
+        #[rustfmt::skip]
+        assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
+            "prt:nonFinite", "prt:truncated", "prt:biased"]);
+    }
+
+    #[test]
+    fn bias_is_named() {
+        let (mut frame, mut settings) = (frame(), RenderSettings::default());
+        assert_eq!(bias_of(&frame, &settings), "no");
+        settings.max_bounces = Some(3);
+        frame.stats.non_finite_samples = 7;
+        assert_eq!(
+            bias_of(&frame, &settings),
+            "paths end after 3 scatterings (--max-bounces); 7 non-finite samples were dropped"
+        );
+    }
+}

@@ -1,0 +1,199 @@
+//! What happened, as JSON: one document per image and `batch.json` for the run. A field whose feature is not built is
+//! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
+
+use crate::scene::Skipped;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// How an image ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// Its files are written.
+    Rendered,
+    /// Its files were there already (not built: everything renders).
+    UpToDate,
+    /// Nothing to draw: no picture, no failure.
+    Empty,
+    /// No picture; `error_message` says why.
+    Failed,
+    /// Stopped from outside.
+    Interrupted,
+}
+
+impl Status {
+    /// Every status.
+    pub const ALL: [Self; 5] = [Self::Rendered, Self::UpToDate, Self::Empty, Self::Failed, Self::Interrupted];
+}
+
+/// One image. Paths as the user would type them.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct ImageReport {
+    pub input: String,
+    pub scene: Option<usize>,
+    pub camera: Option<String>,
+    pub frame: Option<u32>,
+    pub status: Status,
+    pub error_message: Option<String>,
+    pub outputs: Outputs,
+    pub width: Option<u32>,
+    pub height: Option<u32>,
+    pub spp: u32,
+    pub seed: u64,
+    pub accel: Accel,
+    pub seconds: Seconds,
+    pub rays: Option<Rays>,
+    pub mrays_per_s: Option<f64>,
+    /// Not built.
+    pub estimated_error: Option<()>,
+    pub non_finite_samples: Option<u64>,
+    pub truncated: Option<f64>,
+    /// Not built (`--clamp`).
+    pub energy_clamped: Option<f64>,
+    pub peak_rss_bytes: Option<u64>,
+    pub triangles: Option<u64>,
+    pub instances: Option<u64>,
+    pub lights: Option<u64>,
+    pub features: BTreeMap<&'static str, bool>,
+    pub skipped: Vec<Skipped>,
+    pub warnings: Vec<String>,
+    /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
+    #[serde(skip)]
+    pub accel_note: String,
+}
+
+/// Files written; null where none was.
+#[derive(Clone, Debug, Default, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Outputs {
+    pub exr: Option<String>,
+    pub png: Option<String>,
+    pub json: Option<String>,
+}
+
+/// The ray backend; null where it was not chosen or has no such property.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Accel {
+    pub requested: &'static str,
+    pub used: Option<&'static str>,
+    pub version: Option<String>,
+    pub isa: Option<String>,
+}
+
+/// Wall seconds of the image's own work; null where it did not come to that.
+#[derive(Clone, Debug, Default, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Seconds {
+    pub load: Option<f64>,
+    pub decode: Option<f64>,
+    pub build: Option<f64>,
+    pub render: Option<f64>,
+    pub write: Option<f64>,
+    pub total: f64,
+}
+
+/// Rays traced.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Rays {
+    pub camera: u64,
+    pub bounce: u64,
+    pub shadow: u64,
+    pub total: u64,
+}
+
+/// The whole run: `batch.json`.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct BatchReport {
+    pub prt: &'static str,
+    pub command: String,
+    /// UTC, ISO 8601.
+    pub started: String,
+    pub seconds: f64,
+    pub host: Host,
+    /// Of the first image that chose a backend, else as requested.
+    pub accel: Accel,
+    /// Every status, zero or not.
+    pub counts: BTreeMap<Status, usize>,
+    pub images: Vec<ImageReport>,
+}
+
+/// The machine.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Host {
+    pub cpu: Option<String>,
+    pub threads: usize,
+}
+
+/// Indented JSON with a final newline.
+pub fn to_json(report: &impl Serialize) -> String {
+    let mut json = serde_json::to_string_pretty(report).expect("reports have string keys and finite numbers");
+    json.push('\n');
+    json
+}
+
+/// High-water mark of the process's resident memory, bytes; `None` where the system does not tell.
+pub fn peak_rss_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Name of the processor; `None` where the system does not tell.
+pub fn cpu_name() -> Option<String> {
+    let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = info.lines().find_map(|line| line.strip_prefix("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// A time as `2026-01-31T23:59:59Z`.
+pub fn utc(time: std::time::SystemTime) -> String {
+    let seconds = time.duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (days, second) = ((seconds / 86_400) as i64, seconds % 86_400);
+    // After Howard Hinnant, "chrono-Compatible Low-Level Date Algorithms", civil_from_days, for days >= 0.
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    let (hour, minute) = (second / 3600, second / 60 % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{:02}Z", second % 60)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, UNIX_EPOCH};
+
+    #[test]
+    fn times_are_civil_utc() {
+        for (seconds, text) in [
+            (0, "1970-01-01T00:00:00Z"),
+            (951_782_399, "2000-02-28T23:59:59Z"),
+            (951_782_400, "2000-02-29T00:00:00Z"),
+            (1_704_067_200, "2024-01-01T00:00:00Z"),
+            (1_767_225_599, "2025-12-31T23:59:59Z"),
+        ] {
+            assert_eq!(utc(UNIX_EPOCH + Duration::from_secs(seconds)), text);
+        }
+    }
+
+    #[test]
+    fn statuses_are_written_as_in_the_contract() {
+        let names = Status::ALL.map(|s| serde_json::to_value(s).unwrap().as_str().unwrap().to_owned());
+        assert_eq!(names, ["rendered", "up-to-date", "empty", "failed", "interrupted"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn peak_memory_is_plausible() {
+        assert!((1 << 20..1 << 40).contains(&peak_rss_bytes().unwrap()));
+    }
+}

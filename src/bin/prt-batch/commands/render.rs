@@ -1,0 +1,101 @@
+//! `prt-batch INPUT...`
+
+use crate::args::RenderArgs;
+use crate::term::{self, Reporter, Verbosity};
+use prt::batch::{self, BatchSettings, FileOptions, PictureSize, Stop};
+use prt::color::ToneMap;
+use prt::load::LoadOptions;
+use prt::render::RenderSettings;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Width of a picture when no option says it.
+const DEFAULT_WIDTH: u32 = 1280;
+
+pub fn run(args: &RenderArgs) -> ExitCode {
+    if args.inputs.is_empty() {
+        return term::usage(
+            "no INPUT: give .gltf or .glb files, or a folder of them, such as: prt-batch scenes/ --out renders",
+        );
+    }
+    let settings = settings(args);
+    let verbosity = match (args.quiet, args.verbose) {
+        (true, _) => Verbosity::Quiet,
+        (_, true) => Verbosity::Verbose,
+        _ => Verbosity::Normal,
+    };
+    let mut reporter = Reporter::new(args.progress, verbosity);
+    match batch::run(&settings, &mut reporter) {
+        Ok(outcome) => {
+            reporter.summary(&outcome);
+            if args.json {
+                term::print(&batch::report::to_json(&outcome.report));
+            }
+            ExitCode::from(outcome.exit_code())
+        }
+        Err(Stop::Usage(message)) => term::usage(&message),
+        Err(Stop::Unwritable(error)) => {
+            term::error(&format!("{error}\n  Nothing was rendered. Choose another folder with --out."));
+            ExitCode::from(4)
+        }
+    }
+}
+
+fn settings(args: &RenderArgs) -> BatchSettings {
+    let render = RenderSettings {
+        crop: args.crop,
+        spp: args.spp,
+        seed: args.seed,
+        max_bounces: args.max_bounces,
+        filter: args.filter,
+        brdf: args.brdf,
+        accel: args.accel,
+        embree_dirs: embree_dirs(),
+        threads: args.threads,
+        ..RenderSettings::default()
+    };
+    let width = PictureSize::Width(args.width.unwrap_or(DEFAULT_WIDTH));
+    BatchSettings {
+        inputs: args.inputs.clone(),
+        out: args.out.clone(),
+        name: args.name.clone(),
+        size: args.size.map_or(width, |(width, height)| PictureSize::Exact(width, height)),
+        cameras: args.camera.clone(),
+        load: LoadOptions { asset_root: args.asset_root.clone(), scene: args.scene.clone() },
+        render,
+        files: FileOptions {
+            exr: !args.no_exr,
+            png: !args.no_png,
+            compression: args.exr_compression,
+            tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
+        },
+        command: command_line(),
+    }
+}
+
+/// Where libembree4 may lie beside this program: an installation's folders, the project's when run from its target
+/// folder, and the current folder's.
+fn embree_dirs() -> Vec<PathBuf> {
+    let mut dirs = Vec::new();
+    if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
+        dirs.extend([folder.join(".embree"), folder.join("../lib")]);
+        // <project>/target/<profile>/prt-batch
+        if let Some(target) = folder.parent().filter(|target| target.ends_with("target")) {
+            dirs.extend(target.parent().map(|project| project.join(".embree")));
+        }
+    }
+    dirs.extend(std::env::current_dir().map(|folder| folder.join(".embree")));
+    let mut seen = std::collections::HashSet::new();
+    dirs.retain(|dir| seen.insert(dir.clone()));
+    dirs
+}
+
+/// The command line, quoted so that a POSIX shell reads it back.
+fn command_line() -> String {
+    let quoted = |arg: std::ffi::OsString| {
+        let arg = arg.to_string_lossy().into_owned();
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:=,+@%".contains(c);
+        if !arg.is_empty() && arg.chars().all(plain) { arg } else { format!("'{}'", arg.replace('\'', r"'\''")) }
+    };
+    std::env::args_os().map(quoted).collect::<Vec<_>>().join(" ")
+}

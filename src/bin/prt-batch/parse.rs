@@ -1,0 +1,152 @@
+//! Values of options: what is allowed, and what is of the contract but not built.
+
+use prt::batch::{job::CameraChoice, names::NameTemplate};
+use prt::color::ToneCurve;
+use prt::image::exr::ExrCompression;
+use prt::render::{AccelChoice, Brdf, CropWindow, Filter};
+use std::str::FromStr;
+
+/// Most pixels along one side.
+const MAX_SIDE: u32 = prt::batch::MAX_SIDE;
+/// Most samples per pixel: 2^20, where the sampler's sequences end.
+const MAX_SPP: u32 = 1 << 20;
+
+/// One of `built`; those of `unbuilt` are refused by name.
+fn word<T: Copy>(value: &str, built: &[(&str, T)], unbuilt: &[&str]) -> Result<T, String> {
+    if let Some(&(_, found)) = built.iter().find(|(name, _)| *name == value) {
+        return Ok(found);
+    }
+    let names: Vec<_> = built.iter().map(|(name, _)| *name).collect();
+    let names = names.join(", ");
+    if unbuilt.contains(&value) {
+        Err(format!("{value} is not built yet; built: {names}"))
+    } else {
+        Err(format!("allowed: {names}"))
+    }
+}
+
+/// A whole number from `least` to `most`.
+fn number<T: FromStr + PartialOrd + std::fmt::Display>(value: &str, least: T, most: T) -> Result<T, String> {
+    let inside = |n: &T| *n >= least && *n <= most;
+    value.parse().ok().filter(inside).ok_or_else(|| format!("must be a whole number from {least} to {most}"))
+}
+
+pub fn size(value: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| number(text, 1, MAX_SIDE).ok();
+    value
+        .split_once('x')
+        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
+        .ok_or_else(|| format!("must be WIDTHxHEIGHT, such as 1280x720, each from 1 to {MAX_SIDE}"))
+}
+
+pub fn width(value: &str) -> Result<u32, String> {
+    number(value, 1, MAX_SIDE)
+}
+
+pub fn crop(value: &str) -> Result<CropWindow, String> {
+    let wrong =
+        || "must be X,Y,WIDTH,HEIGHT in whole pixels, such as 100,50,64,64, WIDTH and HEIGHT at least 1".to_owned();
+    let numbers: Result<Vec<u32>, _> = value.split(',').map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, width, height]) if width > 0 && height > 0 => Ok(CropWindow { x, y, width, height }),
+        _ => Err(wrong()),
+    }
+}
+
+pub fn camera(value: &str) -> Result<CameraChoice, String> {
+    Ok(match (value, value.parse()) {
+        ("", _) => return Err("must be all, an index or a name".into()),
+        ("all", _) => CameraChoice::All,
+        (_, Ok(index)) => CameraChoice::Index(index),
+        (name, Err(_)) => CameraChoice::Name(name.into()),
+    })
+}
+
+pub fn spp(value: &str) -> Result<u32, String> {
+    number(value, 1, MAX_SPP)
+}
+
+pub fn seed(value: &str) -> Result<u64, String> {
+    number(value, 0, u64::MAX)
+}
+
+pub fn max_bounces(value: &str) -> Result<u32, String> {
+    number(value, 0, prt::render::RenderSettings::BOUNCE_CAP)
+}
+
+pub fn threads(value: &str) -> Result<usize, String> {
+    number(value, 1, 4096)
+}
+
+pub fn filter(value: &str) -> Result<Filter, String> {
+    const MAX_WIDTH: f32 = 64.0;
+    let (name, width) = value.split_once(':').map_or((value, None), |(name, width)| (name, Some(width)));
+    let width = |default: f32| {
+        let inside = |w: &f32| *w > 0.0 && *w <= MAX_WIDTH;
+        let parse = |w: &str| {
+            w.parse().ok().filter(inside).ok_or_else(|| format!("WIDTH must be above 0 and at most {MAX_WIDTH} pixels"))
+        };
+        width.map_or(Ok(default), parse)
+    };
+    match word(name, &[("box", true), ("tent", false)], &["gaussian", "blackman-harris"])? {
+        true => Ok(Filter::Box { width: width(1.0)? }),
+        false => Ok(Filter::Tent { width: width(2.0)? }),
+    }
+}
+
+pub fn accel(value: &str) -> Result<AccelChoice, String> {
+    use AccelChoice::{Auto, Bvh, Embree, Linear};
+    word(value, &[("auto", Auto), ("embree", Embree), ("bvh", Bvh), ("linear", Linear)], &[])
+}
+
+pub fn brdf(value: &str) -> Result<Brdf, String> {
+    word(value, &[("appendix-b", Brdf::AppendixB)], &["full"])
+}
+
+pub fn integrator(value: &str) -> Result<&'static str, String> {
+    word(value, &[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
+}
+
+pub fn exposure(value: &str) -> Result<f64, String> {
+    if value == "auto" {
+        return Err("auto is not built yet; built: a number of stops".into());
+    }
+    let inside = |stops: &f64| (-100.0..=100.0).contains(stops);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be a number of stops from -100 to 100".into())
+}
+
+pub fn tonemap(value: &str) -> Result<ToneCurve, String> {
+    word(value, &[("neutral", ToneCurve::Neutral), ("srgb", ToneCurve::Srgb)], &["agx", "aces"])
+}
+
+pub fn exr(value: &str) -> Result<&'static str, String> {
+    word(value, &[("float", "float")], &["half"])
+}
+
+pub fn exr_compression(value: &str) -> Result<ExrCompression, String> {
+    use ExrCompression::{None, Piz, Rle, Zip, Zips};
+    word(value, &[("zip", Zip), ("zips", Zips), ("piz", Piz), ("rle", Rle), ("none", None)], &[])
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProgressStyle {
+    Auto,
+    Plain,
+    None,
+}
+
+pub fn progress(value: &str) -> Result<ProgressStyle, String> {
+    use ProgressStyle::{Auto, None, Plain};
+    word(value, &[("auto", Auto), ("plain", Plain), ("none", None)], &["json"])
+}
+
+pub fn name(value: &str) -> Result<NameTemplate, String> {
+    NameTemplate::parse(value)
+}
+
+/// A number above 0, or 0.
+pub fn limit(value: &str) -> Result<f64, String> {
+    let inside = |n: &f64| n.is_finite() && *n >= 0.0;
+    value.parse().ok().filter(inside).ok_or_else(|| "must be a number, 0 or more".into())
+}

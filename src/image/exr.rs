@@ -1,0 +1,160 @@
+//! Writes OpenEXR: linear float R, G, B, A with metadata; equal pictures have equal bytes.
+
+use super::exr_header::sort_attributes;
+use exr::meta::attribute::Chromaticities;
+use exr::prelude::*;
+use glam::{DMat4, DVec3, DVec4};
+use std::io::Cursor;
+
+/// Lossless compressions of the pixel data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExrCompression {
+    /// Deflate over 16 lines.
+    #[default]
+    Zip,
+    /// Deflate over single lines.
+    Zips,
+    /// Wavelets.
+    Piz,
+    /// Run lengths.
+    Rle,
+    /// As it is.
+    None,
+}
+
+/// What an EXR file says.
+#[derive(Clone, Debug)]
+pub struct ExrPicture<'a> {
+    /// Width and height of the display window, pixels, origin (0, 0).
+    pub display_size: [u32; 2],
+    /// Left and top edge of the data window, pixels.
+    pub origin: [u32; 2],
+    /// Width and height of the data window, pixels.
+    pub size: [u32; 2],
+    /// `[height * width]` of the data window: linear Rec.709; alpha is written as 1.
+    pub pixels: &'a [[f32; 3]],
+    /// For `worldToCamera` and `worldToNDC`.
+    pub camera: ExrCamera,
+    /// The other attributes; names of at most 31 bytes, each once.
+    pub attributes: Vec<(&'static str, ExrValue)>,
+}
+
+/// The camera of a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct ExrCamera {
+    /// Rigid, right-handed, looking along -Z, for column vectors; metres.
+    pub world_from_camera: DMat4,
+    /// Vertical field of view, radians.
+    pub yfov: f64,
+    /// Width over height of the display window.
+    pub aspect_ratio: f64,
+}
+
+/// Value of an attribute.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ExrValue {
+    /// `string`, stored as UTF-8.
+    Text(String),
+    /// `int`.
+    Int(i32),
+    /// `double`.
+    Double(f64),
+}
+
+/// The bytes of an EXR of `picture`.
+///
+/// # Errors
+/// The pixels do not fill the data window, or the picture does not fit the format, as text.
+pub fn encode(picture: &ExrPicture<'_>, compression: ExrCompression) -> std::result::Result<Vec<u8>, String> {
+    let size = picture.size.map(|side| side as usize);
+    if picture.pixels.len() != size[0] * size[1] {
+        return Err(format!("EXR: {} pixels do not fill {} x {}", picture.pixels.len(), size[0], size[1]));
+    }
+    let channels = SpecificChannels::rgba(|at: Vec2<usize>| {
+        let [r, g, b] = picture.pixels[at.y() * size[0] + at.x()];
+        (r, g, b, 1.0_f32)
+    });
+    let encoding = Encoding {
+        compression: match compression {
+            ExrCompression::Zip => Compression::ZIP16,
+            ExrCompression::Zips => Compression::ZIP1,
+            ExrCompression::Piz => Compression::PIZ,
+            ExrCompression::Rle => Compression::RLE,
+            ExrCompression::None => Compression::Uncompressed,
+        },
+        blocks: Blocks::ScanLines,
+        // Any other order would let the threads that compress decide the order of the chunks.
+        line_order: LineOrder::Increasing,
+    };
+    let mut layer = Layer::new((size[0], size[1]), LayerAttributes::default(), encoding, channels);
+    layer.attributes.layer_position = Vec2(picture.origin[0] as i32, picture.origin[1] as i32);
+    let matrices = CameraMatrices::new(&picture.camera);
+    layer.attributes.world_to_camera = Some(stored_for_row_vectors(matrices.camera_from_world));
+    layer.attributes.world_to_normalized_device = Some(stored_for_row_vectors(matrices.ndc_from_world));
+    for (name, value) in &picture.attributes {
+        let value = match value {
+            ExrValue::Text(value) => AttributeValue::Text(text(value)),
+            ExrValue::Int(value) => AttributeValue::I32(*value),
+            ExrValue::Double(value) => AttributeValue::F64(*value),
+        };
+        layer.attributes.other.insert(text(name), value);
+    }
+    let mut image = Image::from_layer(layer);
+    image.attributes.display_window =
+        IntegerBounds::new(Vec2(0, 0), Vec2(picture.display_size[0] as usize, picture.display_size[1] as usize));
+    image.attributes.chromaticities = Some(REC_709);
+
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(|error| format!("EXR: {error}"))?;
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes).ok_or("EXR: the header just written cannot be read")?;
+    Ok(bytes)
+}
+
+/// Primaries and white point of ITU-R BT.709.
+const REC_709: Chromaticities = Chromaticities {
+    red: Vec2(0.64, 0.33),
+    green: Vec2(0.30, 0.60),
+    blue: Vec2(0.15, 0.06),
+    white: Vec2(0.3127, 0.3290),
+};
+
+/// Text as UTF-8: the crate's own conversion panics outside Latin-1 and writes Latin-1 bytes, which other readers refuse.
+fn text(value: &str) -> Text {
+    Text::from_bytes_unchecked(value.bytes().collect())
+}
+
+/// World to camera and to the picture, for column vectors.
+struct CameraMatrices {
+    /// Left-handed: +x right, +y up, +z forward, metres.
+    camera_from_world: DMat4,
+    /// After division by w: (0,0) upper left, (1,1) lower right of the display window; z in [0, 1), 0 at [`NDC_NEAR`].
+    ndc_from_world: DMat4,
+}
+
+/// Distance that has depth 0 in `worldToNDC`, metres; nothing is clipped by it.
+const NDC_NEAR: f64 = 0.01;
+
+impl CameraMatrices {
+    fn new(camera: &ExrCamera) -> Self {
+        let camera_from_world = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0)) * camera.world_from_camera.inverse();
+        let half_height = (camera.yfov * 0.5).tan();
+        // x_ndc = 1/2 + x / (2 z half_width), y_ndc = 1/2 - y / (2 z half_height), with w = z.
+        let ndc_from_camera = DMat4::from_cols(
+            DVec4::new(0.5 / (half_height * camera.aspect_ratio), 0.0, 0.0, 0.0),
+            DVec4::new(0.0, -0.5 / half_height, 0.0, 0.0),
+            DVec4::new(0.5, 0.5, 1.0, 1.0),
+            DVec4::new(0.0, 0.0, -NDC_NEAR, 0.0),
+        );
+        Self { camera_from_world, ndc_from_world: ndc_from_camera * camera_from_world }
+    }
+}
+
+/// `[4][4]`, row by row, of the matrix for row vectors: the transpose row by row is the original column by column.
+fn stored_for_row_vectors(matrix: DMat4) -> [f32; 16] {
+    matrix.to_cols_array().map(|x| x as f32)
+}
+
+#[cfg(test)]
+#[path = "exr_tests.rs"]
+mod tests;
