@@ -54,8 +54,6 @@ pub struct RayLanes<L: Lanes> {
 }
 
 impl<L: Lanes> RayLanes<L> {
-    // Six arrays are indexed by the axis.
-    #[allow(clippy::needless_range_loop)]
     /// Rays `at..at + L::N`; `at` is a multiple of `L::N`. `scene` are the corners of the scene's bounds.
     #[inline(always)]
     pub fn new(rays: &RayBatch, at: usize, scene: &[[f32; 3]; 2]) -> Self {
@@ -148,8 +146,8 @@ impl<L: Lanes> RayLanes<L> {
     #[inline(always)]
     pub fn test_box(&self, planes: &[f32; 6 * WIDTH], child: usize, down: [bool; 3], end: L::F) -> (u32, L::F) {
         let (mut enter, mut exit) = (L::F::zero(), end);
-        for axis in 0..3 {
-            let (near, far) = rows(axis, down[axis]);
+        for (axis, &down) in down.iter().enumerate() {
+            let (near, far) = rows(axis, down);
             let near = L::F::splat(planes[near + child]).mul_add(self.near_inverse[axis], self.near_start[axis]);
             let far = L::F::splat(planes[far + child]).mul_add(self.far_inverse[axis], self.far_start[axis]);
             enter = near.max(enter);
