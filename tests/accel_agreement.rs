@@ -28,18 +28,16 @@ fn backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
 
 /// Those that need not look at every triangle.
 fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
-    let portable = WideBvh::with_level(triangles, Level::Portable8);
-    portable.validate(triangles).expect("a sound tree");
-    let mut all: Vec<(&'static str, Box<dyn Accel>)> = vec![("bvh portable", Box::new(portable))];
-    if Level::Avx2.is_available() {
-        all.push(("bvh avx2", Box::new(WideBvh::with_level(triangles, Level::Avx2))));
-    }
-    for (name, level) in
-        [("front portable", Level::Portable8), ("front avx2", Level::Avx2), ("front avx512", Level::Avx512)]
-    {
+    let levels = [Level::Portable8, Level::Scalar, Level::Avx2, Level::Avx512];
+    let mut all: Vec<(&'static str, Box<dyn Accel>)> = Vec::new();
+    for level in levels.into_iter().filter(|level| level.is_available()) {
+        let bvh = WideBvh::with_level(triangles, level);
+        bvh.validate(triangles).expect("a sound tree");
+        all.push((level.name(), Box::new(bvh)));
         let Split { front, rest, rest_primitive } = Split::new(triangles.clone());
-        if let (true, Some(big)) = (level.is_available(), front) {
-            let behind = Box::new(WideBvh::build(&rest));
+        if let Some(big) = front {
+            let behind = Box::new(WideBvh::with_level(&rest, level));
+            let name = ["front scalar", "front portable", "front avx2", "front avx512"][level as usize];
             all.push((name, Box::new(Front::new(big, behind, &rest, rest_primitive).with_level(level))));
         }
     }
@@ -53,6 +51,13 @@ fn trace(name: &str, accel: &dyn Accel, rays: &[Ray]) -> Vec<(u32, [u32; 3])> {
     let mut occluded = vec![2; rays.len()];
     accel.intersect(&rays_in, 0..rays.len(), false, &mut hits);
     accel.occluded(&rays_in, rays.len(), &mut occluded);
+    // Camera rays may be traced in another way, to the same hits.
+    let mut coherent = HitBatch::new(rays.len());
+    accel.intersect(&rays_in, 0..rays.len(), true, &mut coherent);
+    for (i, ray) in rays.iter().enumerate() {
+        let bits = |hits: &HitBatch| (hits.primitive[i], [hits.t[i], hits.u[i], hits.v[i]].map(f32::to_bits));
+        assert_eq!(bits(&coherent), bits(&hits), "{name}: the coherent hint changes the hit of {ray:?}");
+    }
     (0..rays.len())
         .map(|i| {
             let hit = hits.primitive[i] != MISS;

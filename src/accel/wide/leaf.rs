@@ -1,10 +1,13 @@
 //! The watertight test on a whole leaf: the operations of `woop.rs`, in its order, on 8 triangles.
 
 use super::node::{Child, Leaves, WIDTH};
-use super::ray::LeafRay;
+use super::ray::SingleRay;
 use crate::accel::MISS;
 use crate::accel::woop::exact_edge;
 use simd::{Float, Lanes, Mask};
+
+/// Lanes at most.
+const MAX_LANES: usize = 16;
 
 /// The nearest hit so far.
 #[derive(Clone, Copy, Debug)]
@@ -24,20 +27,19 @@ struct Crossings {
     v: [f32; WIDTH],
 }
 
-/// Crossings of `ray` with the triangles of `leaf` in (0, `end`].
+/// A corner relative to the ray and sheared, and its distance.
+type Corner<L> = (<L as Lanes>::F, <L as Lanes>::F, <L as Lanes>::F);
+
+/// Crossings of rays and triangles in (0, `end`], of those in `lanes`: which, t, u and v.
 #[inline(always)]
-fn crossings<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, end: f32) -> Option<Crossings> {
-    let n = leaf.count();
-    let rows = &leaves.data[Leaves::offset(leaf)..][..9 * n + WIDTH];
-    let (ax, ay, at) = corner::<L>(rows, 0, n, ray);
-    let (bx, by, bt) = corner::<L>(rows, 3 * n, n, ray);
-    let (cx, cy, ct) = corner::<L>(rows, 6 * n, n, ray);
-    let (mut e0, mut e1, mut e2) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
-    let mut bits = one_side::<L>(e0, e1, e2) & ((1 << n) - 1);
-    if bits == 0 {
-        return None;
-    }
+pub fn cross<L: Lanes>(corners: [Corner<L>; 3], lanes: u32, end: L::F) -> (u32, L::F, L::F, L::F) {
+    let [(ax, ay, at), (bx, by, bt), (cx, cy, ct)] = corners;
     let zero = L::F::zero();
+    let (mut e0, mut e1, mut e2) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+    let mut bits = one_side::<L>(e0, e1, e2) & lanes;
+    if bits == 0 {
+        return (0, zero, zero, zero);
+    }
     let doubtful = (e0.eq(zero) | e1.eq(zero) | e2.eq(zero)).bits() & bits;
     if doubtful != 0 {
         e0 = exact_edges::<L>(e0, cx, by, cy, bx);
@@ -48,7 +50,23 @@ fn crossings<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, end: f32)
     let det = (e0 + e1) + e2;
     let (w, u, v) = (e0 / det, e1 / det, e2 / det);
     let t = (w * at + u * bt) + v * ct;
-    bits &= (t.gt(zero) & t.le(L::F::splat(end))).bits();
+    (bits & (t.gt(zero) & t.le(end)).bits(), t, u, v)
+}
+
+/// A corner from its permuted coordinates.
+#[inline(always)]
+pub fn sheared<L: Lanes>(p: [L::F; 3], origin: &[L::F; 3], shear: &[L::F; 3]) -> Corner<L> {
+    let (x, y, z) = (p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]);
+    (x - shear[0] * z, y - shear[1] * z, shear[2] * z)
+}
+
+/// Crossings of one ray with the triangles of `leaf` in (0, `end`].
+#[inline(always)]
+fn crossings<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, end: f32) -> Option<Crossings> {
+    let n = leaf.count();
+    let rows = &leaves.data[Leaves::offset(leaf)..][..9 * n + WIDTH];
+    let corners = [corner::<L>(rows, 0, n, ray), corner::<L>(rows, 3 * n, n, ray), corner::<L>(rows, 6 * n, n, ray)];
+    let (bits, t, u, v) = cross::<L>(corners, (1 << n) - 1, L::F::splat(end));
     if bits == 0 {
         return None;
     }
@@ -59,15 +77,12 @@ fn crossings<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, end: f32)
     Some(out)
 }
 
-/// One corner of all triangles, relative to the ray and sheared, and its distance. `first` is where its rows begin.
+/// One corner of all triangles of a leaf. `first` is where its rows begin.
 #[inline(always)]
-fn corner<L: Lanes>(rows: &[f32], first: usize, n: usize, ray: &LeafRay<L>) -> (L::F, L::F, L::F) {
+fn corner<L: Lanes>(rows: &[f32], first: usize, n: usize, ray: &SingleRay<L>) -> Corner<L> {
     let [kx, ky, kz] = ray.axes;
-    let x = L::F::load(rows, first + kx * n) - ray.origin[0];
-    let y = L::F::load(rows, first + ky * n) - ray.origin[1];
-    let z = L::F::load(rows, first + kz * n) - ray.origin[2];
-    let [sx, sy, sz] = ray.shear;
-    (x - sx * z, y - sy * z, sz * z)
+    let p = [L::F::load(rows, first + kx * n), L::F::load(rows, first + ky * n), L::F::load(rows, first + kz * n)];
+    sheared::<L>(p, &ray.origin, &ray.shear)
 }
 
 /// Lanes where no edge function is strictly on the other side of another. A NaN may pass: t is NaN then too.
@@ -80,14 +95,14 @@ fn one_side<L: Lanes>(e0: L::F, e1: L::F, e2: L::F) -> u32 {
 /// [`exact_edge`] in every lane. Rare (rays through edges and vertices), so scalar.
 #[inline(always)]
 fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
-    let mut lanes = [[0.0; WIDTH]; 5];
+    let mut lanes = [[0.0; MAX_LANES]; 5];
     edge.store(&mut lanes[0], 0);
     a.store(&mut lanes[1], 0);
     b.store(&mut lanes[2], 0);
     c.store(&mut lanes[3], 0);
     d.store(&mut lanes[4], 0);
     let [mut edge, a, b, c, d] = lanes;
-    for i in 0..WIDTH {
+    for i in 0..L::N {
         edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
     }
     L::F::load(&edge, 0)
@@ -96,7 +111,7 @@ fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F
 /// Updates `nearest` by the triangles of `leaf`; true if there was a nearer one or, at equal t, one of lower index.
 /// `nearest.t` starts as the ray's end, which is excluded.
 #[inline(always)]
-pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, nearest: &mut Nearest) -> bool {
+pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, nearest: &mut Nearest) -> bool {
     let Some(found) = crossings::<L>(leaves, leaf, ray, nearest.t) else { return false };
     let mut bits = found.bits;
     let mut changed = false;
@@ -115,7 +130,7 @@ pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, neare
 
 /// Whether any triangle of `leaf` lies in (0, `t_max`).
 #[inline(always)]
-pub fn occluded<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &LeafRay<L>, t_max: f32) -> bool {
+pub fn occluded<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, t_max: f32) -> bool {
     let Some(found) = crossings::<L>(leaves, leaf, ray, t_max) else { return false };
     // The end itself is excluded.
     (0..WIDTH).any(|i| found.bits >> i & 1 == 1 && found.t[i] < t_max)

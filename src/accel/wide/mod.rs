@@ -1,12 +1,14 @@
 //! Our own 8-wide BVH: `bvh`, the fallback where there is no Embree.
 //!
 //! `build` makes a binary SAH tree, `collapse` merges it to nodes of up to 8 children and leaves of up to 8 triangles,
-//! `traverse` runs batches of rays through it: `ray` tests boxes, `leaf` triangles. `node` is the memory layout.
+//! `traverse` runs single rays through it and `packet` camera rays: `ray` tests boxes, `leaf` triangles. `node` is the
+//! memory layout.
 
 mod build;
 mod collapse;
 mod leaf;
 mod node;
+mod packet;
 mod ray;
 mod traverse;
 mod validate;
@@ -25,27 +27,32 @@ pub struct WideBvh {
     depth: usize,
     /// Low and high corner of everything.
     bounds: [[f32; 3]; 2],
+    /// For single rays: 8 lanes.
     level: Level,
+    /// For packets: any.
+    packet_level: Level,
 }
 
 impl WideBvh {
     /// Builds with the threads of rayon's current pool; the tree does not depend on how many they are.
     pub fn build(triangles: &Triangles) -> Self {
-        Self::with_level(triangles, Level::best_of_8())
+        Self::with_level(triangles, Level::best())
     }
 
-    /// As [`WideBvh::build`], traced at `level`; levels of other than 8 lanes are replaced by the nearest that has 8.
+    /// As [`WideBvh::build`], traced at `level`: camera rays in packets of its lanes, single rays at the nearest level
+    /// that has 8 lanes. All levels find the same hits.
     ///
     /// # Panics
     /// When this CPU does not have the level.
     pub fn with_level(triangles: &Triangles, level: Level) -> Self {
         // AVX-512 gives single rays nothing: in Embree 4.4 AVX2 is as fast or up to 1.14 times faster.
+        let packet_level = level;
         let level = match level {
             Level::Avx512 => Level::Avx2,
             Level::Scalar => Level::Portable8,
             level => level,
         };
-        assert!(level.is_available(), "this CPU has no {}", level.name());
+        assert!(packet_level.is_available(), "this CPU has no {}", packet_level.name());
         let tree = build::BinaryTree::build(triangles);
         let bounds = tree.nodes.first().map_or([[0.0; 3]; 2], |root| {
             let corner = |v: glam::Vec4| [v.x, v.y, v.z];
@@ -53,7 +60,7 @@ impl WideBvh {
         });
         let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
-        Self { nodes, leaves, depth, bounds, level }
+        Self { nodes, leaves, depth, bounds, level, packet_level }
     }
 
     /// What is wrong with the tree over `triangles`, if anything: for tests.
@@ -73,8 +80,15 @@ impl WideBvh {
 }
 
 impl Accel for WideBvh {
-    fn intersect(&self, rays: &RayBatch, range: Range<usize>, _coherent: bool, hits: &mut HitBatch) {
-        dispatch(self.level, traverse::Intersect { bvh: self, rays, range, hits });
+    fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
+        if coherent {
+            let packets = packet::IntersectPackets { bvh: self, rays, range, hits: &mut *hits };
+            for range in dispatch(self.packet_level, packets) {
+                dispatch(self.level, traverse::Intersect { bvh: self, rays, range, hits: &mut *hits });
+            }
+        } else {
+            dispatch(self.level, traverse::Intersect { bvh: self, rays, range, hits });
+        }
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
@@ -85,7 +99,7 @@ impl Accel for WideBvh {
         AccelStats {
             name: "bvh",
             version: String::new(),
-            isa: self.level.name().into(),
+            isa: self.packet_level.name().into(),
             bytes: size_of_val(&*self.nodes) + size_of_val(&*self.leaves.data),
             front: 0,
         }

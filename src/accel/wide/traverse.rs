@@ -7,10 +7,8 @@ use super::WideBvh;
 use super::build::MAX_DEPTH;
 use super::leaf::{self, Nearest};
 use super::node::{Child, WIDTH};
-use super::ray::{BoxRay, LeafRay, box_end};
-use crate::accel::woop::ShearedRay;
+use super::ray::{RayLanes, SingleRay, box_end};
 use crate::accel::{HitBatch, MISS, RayBatch};
-use glam::Vec3;
 use simd::{Float, Kernel, Lanes};
 use std::ops::Range;
 
@@ -64,16 +62,6 @@ impl Stack {
     }
 }
 
-/// A ray of a batch in the forms that nodes and leaves need; `None` if it can hit nothing.
-#[inline(always)]
-fn prepare<L: Lanes>(bvh: &WideBvh, rays: &RayBatch, i: usize) -> Option<(BoxRay<L>, LeafRay<L>, f32)> {
-    let (origin, direction) = ([rays.ox[i], rays.oy[i], rays.oz[i]], [rays.dx[i], rays.dy[i], rays.dz[i]]);
-    let sheared = ShearedRay::new(Vec3::from(origin), Vec3::from(direction))?;
-    let t_max = rays.t_max[i];
-    // False for NaN too.
-    if t_max > 0.0 { Some((BoxRay::new(origin, direction, &bvh.bounds), LeafRay::new(&sheared), t_max)) } else { None }
-}
-
 /// Nearest hits of `rays[range]`.
 pub struct Intersect<'a> {
     pub bvh: &'a WideBvh,
@@ -89,11 +77,23 @@ impl Kernel for Intersect<'_> {
     fn run<L: Lanes>(self) {
         assert!(L::N == WIDTH, "8 children, 8 lanes");
         let Self { bvh, rays, range, hits } = self;
+        if range.is_empty() {
+            return;
+        }
         let mut stack = Stack::new();
+        let mut lanes = RayLanes::<L>::new(rays, range.start / WIDTH * WIDTH, &bvh.bounds);
+        let mut stored = [[0.0; WIDTH]; 18];
+        lanes.store(&mut stored);
         for i in range {
+            let lane = i % WIDTH;
+            if lane == 0 {
+                lanes = RayLanes::new(rays, i, &bvh.bounds);
+                lanes.store(&mut stored);
+            }
             let mut nearest = Nearest { t: rays.t_max[i], u: 0.0, v: 0.0, primitive: MISS };
-            if let Some((boxes, triangles, _)) = prepare::<L>(bvh, rays, i) {
-                intersect_one(bvh, &boxes, &triangles, &mut stack, &mut nearest);
+            if lanes.valid >> lane & 1 == 1 {
+                let ray = SingleRay::<L>::new(&stored, lane, lanes.shape(lane));
+                intersect_one(bvh, &ray, &mut stack, &mut nearest);
             }
             (hits.t[i], hits.u[i], hits.v[i]) = (nearest.t, nearest.u, nearest.v);
             hits.primitive[i] = nearest.primitive;
@@ -103,20 +103,14 @@ impl Kernel for Intersect<'_> {
 }
 
 #[inline(always)]
-fn intersect_one<L: Lanes>(
-    bvh: &WideBvh,
-    boxes: &BoxRay<L>,
-    triangles: &LeafRay<L>,
-    stack: &mut Stack,
-    nearest: &mut Nearest,
-) {
+fn intersect_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, stack: &mut Stack, nearest: &mut Nearest) {
     let mut end = box_end(nearest.t);
     stack.len = 0;
     let mut child = Child::inner(0);
     loop {
         while !child.is_leaf() {
             let node = &bvh.nodes[child.node()];
-            let (mut bits, enter) = boxes.test(&node.planes, L::F::splat(end));
+            let (mut bits, enter) = ray.test_boxes(&node.planes, L::F::splat(end));
             if bits == 0 {
                 break;
             }
@@ -143,7 +137,7 @@ fn intersect_one<L: Lanes>(
             }
             child = first.child;
         }
-        if child.is_leaf() && leaf::intersect(&bvh.leaves, child, triangles, nearest) {
+        if child.is_leaf() && leaf::intersect(&bvh.leaves, child, ray, nearest) {
             end = box_end(nearest.t);
         }
         child = loop {
@@ -178,37 +172,41 @@ impl Kernel for Occluded<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         assert!(L::N == WIDTH, "8 children, 8 lanes");
+        if self.n == 0 {
+            return;
+        }
         let mut stack = Stack::new();
+        let mut lanes = RayLanes::<L>::new(self.rays, 0, &self.bvh.bounds);
+        let mut stored = [[0.0; WIDTH]; 18];
+        lanes.store(&mut stored);
         for (i, out) in self.occluded[..self.n].iter_mut().enumerate() {
-            *out = match prepare::<L>(self.bvh, self.rays, i) {
-                Some((boxes, triangles, t_max)) => {
-                    u8::from(occluded_one(self.bvh, &boxes, &triangles, &mut stack, t_max))
-                }
-                None => 0,
-            };
+            let lane = i % WIDTH;
+            if lane == 0 {
+                lanes = RayLanes::new(self.rays, i, &self.bvh.bounds);
+                lanes.store(&mut stored);
+            }
+            *out = 0;
+            if lanes.valid >> lane & 1 == 1 {
+                let ray = SingleRay::<L>::new(&stored, lane, lanes.shape(lane));
+                *out = u8::from(occluded_one(self.bvh, &ray, &mut stack, self.rays.t_max[i]));
+            }
         }
     }
 }
 
 #[inline(always)]
-fn occluded_one<L: Lanes>(
-    bvh: &WideBvh,
-    boxes: &BoxRay<L>,
-    triangles: &LeafRay<L>,
-    stack: &mut Stack,
-    t_max: f32,
-) -> bool {
+fn occluded_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, stack: &mut Stack, t_max: f32) -> bool {
     let end = L::F::splat(box_end(t_max));
     stack.len = 0;
     let mut child = Child::inner(0);
     loop {
         if child.is_leaf() {
-            if leaf::occluded(&bvh.leaves, child, triangles, t_max) {
+            if leaf::occluded(&bvh.leaves, child, ray, t_max) {
                 return true;
             }
         } else {
             let node = &bvh.nodes[child.node()];
-            let (mut bits, _) = boxes.test(&node.planes, end);
+            let (mut bits, _) = ray.test_boxes(&node.planes, end);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize % WIDTH;
                 bits &= bits - 1;
