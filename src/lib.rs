@@ -13,6 +13,7 @@ pub mod color;
 pub mod compare;
 pub mod error;
 pub mod film;
+pub mod id;
 pub mod image;
 pub mod integrator;
 pub mod light;

@@ -1,5 +1,6 @@
 //! Embree as an [`Accel`]: 16-wide packets, COHERENT for camera rays only (elsewhere it halves the speed), ROBUST so
-//! that closed meshes do not leak.
+//! that closed meshes do not leak. (0 of 200,000 rays aimed at random and at edges; of those aimed exactly at a vertex
+//! 0.19 % pass between its triangles, in Embree 4.4.0. `bvh` loses none.)
 
 use super::{Accel, AccelStats, HitBatch, RayBatch, Triangles};
 use crate::error::RenderError;

@@ -1,7 +1,9 @@
 //! Cameras as described by the file.
 
+mod filter;
 mod rays;
 
+pub use filter::PixelFilter;
 pub use rays::CameraRays;
 
 use glam::DMat4;

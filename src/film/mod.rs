@@ -4,10 +4,6 @@
 //! rounded once and stored whole, so no addition depends on which thread did what, and the spread of the block means
 //! tells the error.
 
-mod filter;
-
-pub use filter::PixelFilter;
-
 use std::ops::Range;
 use std::sync::OnceLock;
 

@@ -1,4 +1,4 @@
-//! Picture files: textures in, EXR and PNG out (always to memory first: [`crate::batch`] puts bytes on disk), EXR in.
+//! Picture files: textures in, EXR and PNG out (always to memory first: `batch` puts bytes on disk), EXR in.
 
 pub mod decode;
 pub mod exr;

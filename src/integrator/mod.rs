@@ -10,8 +10,7 @@ mod wave;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;
-use crate::camera::CameraRays;
-use crate::film::PixelFilter;
+use crate::camera::{CameraRays, PixelFilter};
 use crate::light::table::LightTable;
 use crate::material::table::MaterialTable;
 use crate::shape::table::TriangleTable;

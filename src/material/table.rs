@@ -2,8 +2,8 @@
 
 use super::Material;
 use super::bsdf::Surface;
+use crate::id::TextureId;
 use crate::math::V3;
-use crate::scene::TextureId;
 use crate::texture::lookup::{Encoding, NO_TEXTURE, TextureTable};
 use simd::{Float, Lanes, Mask, Uint};
 

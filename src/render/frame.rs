@@ -2,9 +2,9 @@
 
 use super::prepare::{Prepared, prepare};
 use super::{CropWindow, Filter, Frame, FrameCamera, Progress, RenderSettings, RenderStats, schedule};
-use crate::camera::{Camera, CameraRays, Projection};
+use crate::camera::{Camera, CameraRays, PixelFilter, Projection};
 use crate::error::RenderError;
-use crate::film::{Film, PixelFilter, Tile};
+use crate::film::{Film, Tile};
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
 use glam::{DMat4, DVec3};

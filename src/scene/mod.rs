@@ -4,6 +4,7 @@
 mod builder;
 mod check;
 
+pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
 pub use builder::SceneBuilder;
 
 use crate::camera::Camera;
@@ -12,25 +13,6 @@ use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Image, Texture};
 use glam::DMat4;
-
-macro_rules! id {
-    ($name:ident, $of:literal) => {
-        #[doc = concat!("Index of ", $of, " in its [`Scene`].")]
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub struct $name(pub u32);
-
-        impl $name {
-            /// As an index into the scene's list.
-            pub fn index(self) -> usize {
-                self.0 as usize
-            }
-        }
-    };
-}
-id!(MeshId, "a mesh");
-id!(MaterialId, "a material");
-id!(TextureId, "a texture");
-id!(ImageId, "an image");
 
 /// A mesh placed in the world.
 #[derive(Clone, Debug)]

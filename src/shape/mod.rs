@@ -2,7 +2,7 @@
 
 pub mod table;
 
-use crate::scene::MaterialId;
+use crate::id::MaterialId;
 
 /// Triangles of one material, object space (one glTF primitive).
 #[derive(Clone, Debug)]

@@ -166,7 +166,7 @@ pub fn srgb_to_linear<F: Float>(v: F) -> F {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::ImageId;
+    use crate::id::ImageId;
     use simd::{Kernel, Level, dispatch};
 
     struct Read<'a> {

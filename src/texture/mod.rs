@@ -2,7 +2,7 @@
 
 pub mod lookup;
 
-use crate::scene::{ImageId, TextureId};
+use crate::id::{ImageId, TextureId};
 
 /// Decoded pixels, 8 bits a channel, as encoded in the file (sRGB or linear is decided by the use, not here).
 #[derive(Clone, Debug)]
