@@ -15,5 +15,10 @@ if [ -x "$project/scripts/get-embree.sh" ] && ! "$project/scripts/get-embree.sh"
 fi
 
 # In the project's folder, so that its toolchain and cargo settings hold; paths given by the user stay the user's.
-(cd "$project" && cargo build --release --locked --quiet --bin prt-batch)
+quiet=--quiet
+if [ ! -x "$project/target/release/prt-batch" ]; then
+  echo "building prt-batch (once; a few minutes)" >&2
+  quiet=
+fi
+(cd "$project" && cargo build --release --locked $quiet --bin prt-batch)
 exec "$project/target/release/prt-batch" "$@"

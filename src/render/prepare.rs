@@ -233,6 +233,11 @@ fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dy
         AccelChoice::Linear => unreachable!("returned above"),
         AccelChoice::Bvh => Box::new(WideBvh::build(&rest)),
         AccelChoice::Embree => Box::new(EmbreeAccel::build(&rest, &settings.embree_dirs)?),
+        AccelChoice::Auto if rest.indices.is_empty() => {
+            // Opening libembree4 costs tens of milliseconds, for nothing.
+            note = String::from("every triangle is tested in packets, so no Embree is needed");
+            Box::new(WideBvh::build(&rest))
+        }
         AccelChoice::Auto => match EmbreeAccel::build(&rest, &settings.embree_dirs) {
             Ok(embree) => Box::new(embree),
             Err(why) => {
