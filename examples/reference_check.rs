@@ -9,12 +9,14 @@
 #[path = "../tests/support/mod.rs"]
 mod support;
 
+use prt::compare::{BlockTest, block_test};
+use prt::image::exr_read::Picture;
 use prt::render::{AccelChoice, RenderSettings};
 use std::process::ExitCode;
 use std::time::Instant;
-use support::pictures::{Picture, read_exr, reference_stats, settings, shoot_seeds};
+use support::pictures::{read_exr, reference_stats, settings, shoot_seeds};
 use support::reference::mean_verdicts;
-use support::verdict::{BlockVerdict, FAMILY_SIGNIFICANCE, MAX_BIAS, MeanVerdict, block_test};
+use support::verdict::{MAX_BIAS, MeanVerdict};
 use support::{planted, scenes};
 
 const USAGE: &str = "usage: reference_check [--scenes a,b,..] [--seeds N] [--spp-scale F] [--accel auto|embree|bvh]
@@ -71,15 +73,10 @@ fn options() -> Result<Options, String> {
 }
 
 /// The block test with a fault planted in every run.
-fn with_fault(
-    runs: &[Vec<[f32; 3]>],
-    fault: impl Fn(&mut [[f32; 3]]),
-    reference: &Picture,
-    rel_se: f64,
-) -> BlockVerdict {
+fn with_fault(runs: &[Picture], fault: impl Fn(&mut Picture), reference: &Picture, rel_se: f64) -> BlockTest {
     let mut faulty = runs.to_vec();
-    faulty.iter_mut().for_each(|run| fault(run));
-    block_test(&faulty, &reference.pixels, reference.width, rel_se)
+    faulty.iter_mut().for_each(fault);
+    block_test(&faulty, reference, rel_se)
 }
 
 /// Prints one row; what is wrong comes back.
@@ -90,21 +87,20 @@ fn check(name: &str, options: &Options) -> Vec<String> {
     let spp = (f64::from(samples(name)) * options.spp_scale).ceil() as u32;
     let settings = RenderSettings { accel: options.accel, ..settings(reference.width as u32, spp, 0) };
     let runs = shoot_seeds(&scenes::reference(name), &settings, options.seeds);
-    let means = mean_verdicts(name, &runs, &stats, reference.width);
+    let means = mean_verdicts(name, &runs, &stats);
     let wrong = |(channel, mean): (usize, &MeanVerdict)| {
         mean.within(MAX_BIAS).err().map(|problem| format!("channel {channel}: {problem}"))
     };
     let mut problems: Vec<String> = means.iter().enumerate().filter_map(wrong).collect();
 
-    let blocks = block_test(&runs, &reference.pixels, reference.width, stats.rel_se);
-    if blocks.min_p < FAMILY_SIGNIFICANCE {
-        let (bx, by, channel) = blocks.worst;
-        problems.push(format!("block ({bx}, {by}), channel {channel} is biased: adjusted p {:.1e}", blocks.min_p));
+    let blocks = block_test(&runs, &reference, stats.rel_se);
+    if blocks.rejected > 0 {
+        let ([x, y, channel], p) = (blocks.worst_at, blocks.smallest_p);
+        problems.push(format!("block at ({x}, {y}), channel {channel} is biased: adjusted p {p:.1e}"));
     }
-    let found = |verdict: BlockVerdict| verdict.min_p < FAMILY_SIGNIFICANCE;
+    let found = |test: BlockTest| test.rejected > 0;
     let everywhere = found(with_fault(&runs, |run| planted::scale(run, 1.005), &reference, stats.rel_se));
-    let quarter = |run: &mut [[f32; 3]]| planted::scale_quarter(run, reference.width, 1.005);
-    let quarter = found(with_fault(&runs, quarter, &reference, stats.rel_se));
+    let quarter = found(with_fault(&runs, |run| planted::scale_quarter(run, 1.005), &reference, stats.rel_se));
     if !everywhere {
         problems.push(String::from("0.5 % of planted light was not found: too few samples, or a broken test"));
     }
@@ -112,8 +108,8 @@ fn check(name: &str, options: &Options) -> Vec<String> {
     let yes = |x| if x { "yes" } else { "no" };
     println!(
         "| {name:14} | {spp:4} | {r:.5} {g:.5} {b:.5} | {:6.2} | {:8.1e} | {:>7} | {:>7} | {:7.1} |",
-        blocks.max_t,
-        blocks.min_p,
+        blocks.largest_t,
+        blocks.smallest_p,
         yes(everywhere),
         yes(quarter),
         start.elapsed().as_secs_f64(),

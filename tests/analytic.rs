@@ -34,7 +34,7 @@ const SHARP: Bounds = Bounds { bias: MAX_BIAS, fault: 1.005 };
 
 /// What the picture's mean is over seeds, against `value`; a value moved by the fault must not pass.
 fn assert_shows(what: &str, scene: &Scene, settings: &RenderSettings, value: f64, bounds: Bounds) {
-    let runs: Vec<f64> = shoot_seeds(scene, settings, 8).iter().map(|run| channel_means(run)[1]).collect();
+    let runs: Vec<f64> = shoot_seeds(scene, settings, 8).iter().map(|run| channel_means(&run.pixels)[1]).collect();
     let test = |value: f64| mean_test(&runs, Expected { value, rel_se: 0.0 }).within(bounds.bias);
     test(value).unwrap_or_else(|e| panic!("{what}: expected {value:.6}: {e}"));
     assert!(test(value * bounds.fault).is_err(), "{what}: the test does not see a factor of {}", bounds.fault);

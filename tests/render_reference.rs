@@ -10,6 +10,7 @@
 
 mod support;
 
+use prt::image::exr_read::Picture;
 use support::pictures::{reference_stats, settings, shoot_seeds};
 use support::reference::mean_verdicts;
 use support::verdict::{MAX_BIAS, MeanVerdict};
@@ -34,9 +35,9 @@ fn check(name: &str, spp: u32) {
 }
 
 /// One line for each channel that is wrong.
-fn compare(name: &str, runs: &[Vec<[f32; 3]>]) -> Vec<String> {
+fn compare(name: &str, runs: &[Picture]) -> Vec<String> {
     let stats = reference_stats(&scenes::reference_folder(name), "ref_mitsuba");
-    let verdicts = mean_verdicts(name, runs, &stats, SIZE as usize);
+    let verdicts = mean_verdicts(name, runs, &stats);
     let judge = |(channel, verdict): (usize, &MeanVerdict)| {
         println!("{name}[{channel}]: bias {:+.5} %, s.e. {:.5} %", 100.0 * verdict.bias, 100.0 * verdict.rel_se);
         verdict.within(MAX_BIAS).err().map(|e| format!("channel {channel}: {e}"))

@@ -5,9 +5,11 @@
 
 mod support;
 
+use prt::compare::block_test;
+use prt::image::exr_read::Picture;
 use support::planted::{Fault, Stream, sky_irradiance};
 use support::stats::*;
-use support::verdict::{Expected, FAMILY_SIGNIFICANCE, MAX_BIAS, block_test, mean_test};
+use support::verdict::{Expected, MAX_BIAS, mean_test};
 use support::{closed, planted};
 
 fn assert_close(got: f64, want: f64, relative: f64) {
@@ -18,21 +20,27 @@ fn assert_close(got: f64, want: f64, relative: f64) {
 fn ln_gamma_matches_factorials_and_the_half_integer() {
     assert_close(ln_gamma(11.0), 3_628_800.0_f64.ln(), 1e-13);
     assert_close(ln_gamma(0.5), std::f64::consts::PI.ln() / 2.0, 1e-13);
+    assert_close(ln_gamma(0.1), 2.252_712_651_734_206, 1e-12);
     assert!(ln_gamma(1.0).abs() < 1e-13);
 }
 
 #[test]
 fn student_t_matches_tables_and_the_exact_cases_of_one_and_two_degrees() {
     // Printed two-sided 5 %, 1 % and 0.1 % points.
-    for (dof, t, p) in
-        [(5.0, 2.570_582, 0.05), (10.0, 3.169_273, 0.01), (31.0, 2.039_513, 0.05), (30.0, 3.645_959, 0.001)]
-    {
+    for (dof, t, p) in [
+        (5.0, 2.570_582, 0.05),
+        (10.0, 3.169_273, 0.01),
+        (31.0, 2.039_513, 0.05),
+        (30.0, 3.645_959, 0.001),
+        (10.0, 4.586_894, 0.001),
+        (4.0, 2.776_445, 0.05),
+    ] {
         assert_close(student_t_two_sided_p(t, dof), p, 1e-5);
         assert_close(student_t_quantile(1.0 - p / 2.0, dof), t, 1e-6);
     }
-    for t in [0.1_f64, 1.0, 7.0, 300.0] {
+    for t in [0.01_f64, 0.1, 0.5, 1.0, 3.0, 7.0, 30.0, 300.0] {
         assert_close(student_t_two_sided_p(t, 1.0), 2.0 / std::f64::consts::PI * (1.0 / t).atan(), 1e-12);
-        assert_close(student_t_two_sided_p(t, 2.0), 1.0 - t / (2.0 + t * t).sqrt(), 1e-9);
+        assert_close(student_t_two_sided_p(-t, 2.0), 1.0 - t / (2.0 + t * t).sqrt(), 1e-9);
     }
     assert_eq!(student_t_two_sided_p(0.0, 7.0), 1.0);
     assert_eq!(student_t_two_sided_p(f64::NAN, 7.0), 0.0, "not a number is a failure");
@@ -43,6 +51,9 @@ fn student_t_matches_tables_and_the_exact_cases_of_one_and_two_degrees() {
 #[test]
 fn student_t_with_many_degrees_is_normal() {
     assert_close(student_t_two_sided_p(4.0, 1e7), normal_two_sided_p(4.0), 1e-5);
+    assert_close(student_t_two_sided_p(1.959_963_984_540_054, 1e9), 0.05, 1e-6);
+    // No step where the normal distribution takes over, and enough terms just below.
+    assert_close(student_t_two_sided_p(5.0, 9.9e6), student_t_two_sided_p(5.0, 1.1e7), 1e-4);
 }
 
 #[test]
@@ -61,6 +72,11 @@ fn chi_square_matches_tables() {
         assert_close(chi_square_p(x, dof), p, 1e-6);
     }
     assert_close(chi_square_p(7.0, 2.0), (-3.5_f64).exp(), 1e-13);
+    for x in [0.1_f64, 1.0, 10.0, 100.0] {
+        assert_close(chi_square_p(x, 2.0), (-0.5 * x).exp(), 1e-11);
+        assert_close(chi_square_p(x, 4.0), (-0.5 * x).exp() * (1.0 + 0.5 * x), 1e-11);
+    }
+    assert_eq!((chi_square_p(f64::NAN, 3.0), chi_square_p(f64::INFINITY, 3.0)), (0.0, 0.0));
 }
 
 #[test]
@@ -87,13 +103,20 @@ fn welch_matches_a_worked_example() {
     let a = Sample::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
     let b = Sample::of(&[2.0, 4.0, 6.0, 8.0, 10.0]);
     assert_eq!((a.mean, a.variance, b.mean, b.variance), (3.0, 2.5, 6.0, 10.0));
-    let (t, dof) = welch(&a, &b);
-    assert_close(t, -3.0 / 2.5_f64.sqrt(), 1e-12);
-    assert_close(dof, 6.25 / 1.0625, 1e-12);
+    let result = welch(&a, &b);
+    assert_close(result.t, -3.0 / 2.5_f64.sqrt(), 1e-12);
+    assert_close(result.dof, 6.25 / 1.0625, 1e-12);
+    assert_close(result.p, student_t_two_sided_p(result.t, result.dof), 1e-12);
+    // Sizes 4 and 3, variances 5/3 and 4.
+    let result = welch(&Sample::of(&[1.0, 2.0, 3.0, 4.0]), &Sample::of(&[2.0, 4.0, 6.0]));
+    assert_close(result.t, -1.5 / 1.75_f64.sqrt(), 1e-12);
+    assert_close(result.dof, 1.75 * 1.75 / (25.0 / 144.0 / 3.0 + 16.0 / 9.0 / 2.0), 1e-12);
     // Equal sizes and variances give n1 + n2 - 2.
     let same = Sample { n: 9, mean: 1.0, variance: 2.0 };
-    assert_close(welch(&same, &Sample { mean: 3.0, ..same }).1, 16.0, 1e-12);
-    assert_eq!(welch(&same, &same).0, 0.0);
+    assert_close(welch(&same, &Sample { mean: 3.0, ..same }).dof, 16.0, 1e-12);
+    assert_eq!(welch(&same, &same).t, 0.0);
+    let of = |x: f64| Sample::of(&[x, x]);
+    assert_eq!((welch(&of(1.0), &of(1.0)).p, welch(&of(1.0), &of(2.0)).p), (1.0, 0.0), "no noise at all");
 }
 
 /// Means over `seeds` runs of the small path tracer; exact: 5/3.
@@ -149,9 +172,9 @@ fn p_values_of_a_sound_estimator_are_uniform() {
 
 /// A made-up picture, 64 x 64: a gradient with normal noise of relative standard deviation `noise`, twice that in the
 /// lower half (as shadows have).
-fn noisy_picture(seed: u64, noise: f64) -> Vec<[f32; 3]> {
+fn noisy_picture(seed: u64, noise: f64) -> Picture {
     let mut stream = Stream::new(seed);
-    (0..64 * 64)
+    let pixels = (0..64 * 64)
         .map(|i| {
             let noise = if i < 32 * 64 { noise } else { 2.0 * noise };
             [0.2, 1.0, 3.0].map(|base| {
@@ -159,7 +182,8 @@ fn noisy_picture(seed: u64, noise: f64) -> Vec<[f32; 3]> {
                 (base * (1.0 + (i % 64) as f64 / 32.0) * (1.0 + noise * (sum - 6.0))) as f32
             })
         })
-        .collect()
+        .collect();
+    Picture { origin: [0, 0], width: 64, height: 64, pixels }
 }
 
 // 60 pictures' worth of trials, 8 seeds each at 2 % noise, reference at 1 %; family-wise 1e-3, so the chance that a
@@ -169,8 +193,8 @@ fn block_test_is_quiet_on_equal_pictures_with_uneven_noise() {
     let rms = 0.01 * 2.5_f64.sqrt(); // of 1 % in one half and 2 % in the other
     for trial in 0..60 {
         let runs: Vec<_> = (0..8).map(|k| noisy_picture(100 * trial + k, 0.02)).collect();
-        let verdict = block_test(&runs, &noisy_picture(100 * trial + 99, 0.01), 64, rms);
-        assert!(verdict.min_p > FAMILY_SIGNIFICANCE, "trial {trial}: {verdict:?}");
+        let verdict = block_test(&runs, &noisy_picture(100 * trial + 99, 0.01), rms);
+        assert!(verdict.rejected == 0, "trial {trial}: {verdict:?}");
     }
 }
 
@@ -182,23 +206,23 @@ fn block_test_finds_half_a_percent() {
     for quarter in [false, true] {
         let mut runs: Vec<_> = (0..32).map(|k| noisy_picture(k, 0.02)).collect();
         for run in &mut runs {
-            if quarter { planted::scale_quarter(run, 64, 1.005) } else { planted::scale(run, 1.005) }
+            if quarter { planted::scale_quarter(run, 1.005) } else { planted::scale(run, 1.005) }
         }
-        let verdict = block_test(&runs, &reference, 64, rms);
-        assert!(verdict.min_p < FAMILY_SIGNIFICANCE, "quarter {quarter}: {verdict:?}");
+        let verdict = block_test(&runs, &reference, rms);
+        assert!(verdict.rejected > 0, "quarter {quarter}: {verdict:?}");
     }
 }
 
 #[test]
 fn block_test_judges_noiseless_pictures_by_rounding() {
-    let flat = |x: f32| vec![[x; 3]; 32 * 32];
-    let against = |x: f32| block_test(&vec![flat(x); 8], &flat(1.219_197_5), 32, 0.0).min_p;
-    assert!(against(1.219_197_5) == 1.0);
-    assert!(against(1.219_199_5) > FAMILY_SIGNIFICANCE, "1.6e-6 is rounding");
-    assert!(against(1.219_222) < FAMILY_SIGNIFICANCE, "2e-5 is not");
-    assert_eq!(block_test(&vec![flat(0.0); 8], &flat(0.0), 32, 0.01).min_p, 1.0);
-    assert!(block_test(&vec![flat(0.1); 8], &flat(0.0), 32, 0.01).min_p < FAMILY_SIGNIFICANCE, "light where none is");
-    assert!(block_test(&vec![flat(f32::NAN); 8], &flat(1.0), 32, 0.01).min_p < FAMILY_SIGNIFICANCE);
+    let flat = |x: f32| Picture { origin: [0, 0], width: 32, height: 32, pixels: vec![[x; 3]; 32 * 32] };
+    let rejected = |x: f32, reference: f32, se: f64| block_test(&vec![flat(x); 8], &flat(reference), se).rejected;
+    assert_eq!(rejected(1.219_197_5, 1.219_197_5, 0.0), 0);
+    assert_eq!(rejected(1.219_199_5, 1.219_197_5, 0.0), 0, "1.6e-6 is rounding");
+    assert!(rejected(1.219_222, 1.219_197_5, 0.0) > 0, "2e-5 is not");
+    assert_eq!(rejected(0.0, 0.0, 0.01), 0);
+    assert!(rejected(0.1, 0.0, 0.01) > 0, "light where none is");
+    assert!(rejected(f32::NAN, 1.0, 0.01) > 0);
 }
 
 #[test]

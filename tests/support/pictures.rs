@@ -1,27 +1,13 @@
 //! Rendering over seeds, and reading stored pictures.
 
+use prt::image::exr_read::{self, Picture};
 use prt::render::{AccelChoice, Brdf, Filter, Frame, Progress, RenderSettings, render};
 use prt::scene::Scene;
 use std::path::Path;
 
-/// A stored picture.
-pub struct Picture {
-    /// Pixels across.
-    pub width: usize,
-    /// `[height * width]` linear Rec.709, row 0 at the top.
-    pub pixels: Vec<[f32; 3]>,
-}
-
-/// Reads the first layer of an EXR with channels R, G, B.
+/// Reads a stored picture.
 pub fn read_exr(path: &Path) -> Picture {
-    let image = exr::prelude::read_first_rgba_layer_from_file(
-        path,
-        |size, _| Picture { width: size.width(), pixels: vec![[0.0; 3]; size.area()] },
-        |picture: &mut Picture, at, (r, g, b, _): (f32, f32, f32, f32)| {
-            picture.pixels[at.y() * picture.width + at.x()] = [r, g, b];
-        },
-    );
-    image.unwrap_or_else(|e| panic!("{}: {e}", path.display())).layer_data.channel_data.pixels
+    exr_read::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 /// What stats.json says of a reference picture.
@@ -43,7 +29,8 @@ pub fn reference_stats(folder: &Path, which: &str) -> ReferenceStats {
     serde_json::from_value(all[which].clone()).unwrap_or_else(|e| panic!("{}: {which}: {e}", path.display()))
 }
 
-/// Settings under which pictures are comparable with the references: box filter of one pixel, 32 bounces.
+/// Settings under which pictures are comparable with the references: box filter of one pixel, 32 bounces. `auto` takes
+/// Embree where `scripts/get-embree.sh` brought it.
 pub fn settings(size: u32, spp: u32, seed: u64) -> RenderSettings {
     RenderSettings {
         width: size,
@@ -53,7 +40,8 @@ pub fn settings(size: u32, spp: u32, seed: u64) -> RenderSettings {
         max_bounces: Some(32),
         filter: Filter::Box { width: 1.0 },
         brdf: Brdf::AppendixB,
-        accel: AccelChoice::Bvh,
+        accel: AccelChoice::Auto,
+        embree_dirs: vec![Path::new(env!("CARGO_MANIFEST_DIR")).join(".embree")],
         ..RenderSettings::default()
     }
 }
@@ -66,8 +54,10 @@ pub fn shoot(scene: &Scene, settings: &RenderSettings) -> Frame {
 }
 
 /// One picture a seed, seeds `0..count`.
-pub fn shoot_seeds(scene: &Scene, settings: &RenderSettings, count: u64) -> Vec<Vec<[f32; 3]>> {
-    (0..count).map(|seed| shoot(scene, &RenderSettings { seed, ..settings.clone() }).pixels).collect()
+pub fn shoot_seeds(scene: &Scene, settings: &RenderSettings, count: u64) -> Vec<Picture> {
+    let (width, height) = (settings.width as usize, settings.height as usize);
+    let shoot = |seed| shoot(scene, &RenderSettings { seed, ..settings.clone() }).pixels;
+    (0..count).map(|seed| Picture { origin: [0, 0], width, height, pixels: shoot(seed) }).collect()
 }
 
 /// Mean of a picture per channel.

@@ -1,5 +1,7 @@
 //! Faults put in on purpose: a statistical test that does not find its fault is broken.
 
+use prt::image::exr_read::Picture;
+
 /// A fault in the estimator of [`sky_irradiance`], or none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
@@ -16,15 +18,14 @@ pub enum Fault {
 }
 
 /// Multiplies every pixel.
-pub fn scale(pixels: &mut [[f32; 3]], factor: f32) {
-    pixels.iter_mut().flatten().for_each(|x| *x *= factor);
+pub fn scale(picture: &mut Picture, factor: f32) {
+    picture.pixels.as_flattened_mut().iter_mut().for_each(|x| *x *= factor);
 }
 
-/// Multiplies the upper left quarter of a picture `width` across.
-pub fn scale_quarter(pixels: &mut [[f32; 3]], width: usize, factor: f32) {
-    let height = pixels.len() / width;
-    for row in pixels.chunks_mut(width).take(height / 2) {
-        scale(&mut row[..width / 2], factor);
+/// Multiplies the upper left quarter.
+pub fn scale_quarter(picture: &mut Picture, factor: f32) {
+    for row in picture.pixels.chunks_mut(picture.width).take(picture.height / 2) {
+        row[..picture.width / 2].as_flattened_mut().iter_mut().for_each(|x| *x *= factor);
     }
 }
 
