@@ -5,7 +5,7 @@ use super::pool::{POOL, PathPool};
 use super::shade::Shade;
 use crate::math::V3;
 use crate::sampler::{Key, dims, pixel_seed};
-use simd::{Float, Kernel, Lanes, Uint, dispatch};
+use simd::{Float, Kernel, Lanes, Uint, dispatch_large};
 use std::ops::Range;
 
 /// Receives finished samples, in a fixed order for a fixed unit.
@@ -75,7 +75,7 @@ impl PathTracer<'_> {
             counters.camera += (n - old) as u64;
             counters.bounce += old as u64;
 
-            dispatch(self.level, Shade { tracer: self, pool, counters });
+            dispatch_large(self.level, Shade { tracer: self, pool, counters });
 
             let n_shadow = pool.n_shadow;
             counters.shadow += n_shadow as u64;
@@ -146,7 +146,7 @@ impl Feed {
             }
         }
         pool.n = n;
-        dispatch(tracer.level, Generate { tracer, pool, range: start..n });
+        dispatch_large(tracer.level, Generate { tracer, pool, range: start..n });
     }
 }
 

@@ -57,7 +57,8 @@ fn render_here(
         Some(8) => Level::best_of_8(),
         Some(16) => Level::Avx512,
         Some(n) => panic!("{n} lanes; allowed: 1, 8, 16"),
-    };
+    }
+    .without_portable();
     let tracer = PathTracer {
         tables: &prepared.tables,
         accel: &*prepared.accel,

@@ -58,6 +58,11 @@ impl Level {
         matches!(self, Self::Scalar | Self::Portable8)
     }
 
+    /// Itself, but one lane in place of [`Level::Portable8`], for [`dispatch_large`].
+    pub fn without_portable(self) -> Self {
+        if self == Self::Portable8 { Self::Scalar } else { self }
+    }
+
     /// Lanes: 1, 8 or 16.
     pub fn lanes(self) -> u32 {
         match self {
@@ -83,10 +88,18 @@ impl Level {
 /// # Panics
 /// When this CPU does not have it.
 pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
-    assert!(level.is_available(), "this CPU has no {}", level.name());
+    if level == Level::Portable8 { kernel.run::<Portable8>() } else { dispatch_large(level, kernel) }
+}
+
+/// [`dispatch`] for a kernel that is large enough for its build time to matter: never at [`Level::Portable8`], whose
+/// plain code is five times that of AVX-512. [`Level::without_portable`] takes its place by one lane.
+///
+/// # Panics
+/// When this CPU does not have the level, and at [`Level::Portable8`].
+pub fn dispatch_large<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    assert!(level.is_available() && level != Level::Portable8, "not {} here", level.name());
     match level {
-        Level::Scalar => kernel.run::<Scalar>(),
-        Level::Portable8 => kernel.run::<Portable8>(),
+        Level::Scalar | Level::Portable8 => kernel.run::<Scalar>(),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: availability was asserted above.
         Level::Avx2 => unsafe { with_avx2(kernel) },

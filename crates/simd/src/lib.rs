@@ -1,15 +1,15 @@
 //! SIMD lanes for code that is written once and runs 1, 8 or 16 wide.
 //!
-//! A [`Kernel`] is generic over [`Lanes`]; [`dispatch`] runs it at a [`Level`] that this CPU was found to have. All
-//! `std::arch` of the project lives here.
+//! A [`Kernel`] is generic over [`Lanes`]; [`dispatch`] (or [`dispatch_large`]) runs it at a [`Level`] that this CPU was
+//! found to have. All `std::arch` of the project lives here.
 //!
 //! Everything a kernel calls must be `#[inline(always)]`: only then is it compiled with the level's instructions
 //! (an outlined function falls back to the build's baseline and passes vectors through memory).
 //!
 //! # Soundness
 //! The methods of the AVX types use intrinsics that are undefined behaviour on a CPU without them. The lane types are
-//! therefore private: the only way to name one is as the parameter `L` of [`Kernel::run`], and [`dispatch`] calls that
-//! only after it has found the instructions on this CPU.
+//! therefore private: the only way to name one is as the parameter `L` of [`Kernel::run`], and dispatching calls
+//! that only after it has found the instructions on this CPU.
 
 mod array;
 #[cfg(target_arch = "x86_64")]
@@ -22,4 +22,4 @@ mod level;
 
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
-pub use level::{Kernel, Level, dispatch};
+pub use level::{Kernel, Level, dispatch, dispatch_large};
