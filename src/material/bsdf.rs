@@ -226,3 +226,7 @@ fn masking<L: Lanes>(w: V3<L>, a2: L::F) -> L::F {
     let tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
     ((one + a2 * tan2).sqrt() - one) * L::F::splat(0.5)
 }
+
+#[cfg(test)]
+#[path = "bsdf_tests.rs"]
+mod tests;

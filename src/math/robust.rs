@@ -80,4 +80,37 @@ mod tests {
         assert!(up.y - p.y < 8e-6 && p.y - down.y < 8e-6);
         assert_eq!((up.x, up.z), (p.x, p.z));
     }
+
+    #[test]
+    fn lanes_move_points_as_far_as_the_scalar_form() {
+        use crate::math::lanes::tests::at_all_levels;
+        use simd::Kernel;
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                for (p, extent) in [([3.0, -5.0, 7.0], [4.0, 9.0, 8.0]), ([0.0, 0.0, 2e-7], [0.0, 0.0, 1e-6])] {
+                    for ng in [Vec3::Y, Vec3::new(0.6, 0.0, -0.8), Vec3::new(1.0, 1.0, 1.0).normalize()] {
+                        let n = V3::<L>::splat(ng.to_array());
+                        let moved = offset_point(V3::splat(p), n, offset_length(V3::<L>::splat(extent), n));
+                        let expected = offset_origin(Vec3::from(p), Vec3::from(extent), ng, ng);
+                        let mut out = [[0.0; 16]; 3];
+                        moved.x.store(&mut out[0], 0);
+                        moved.y.store(&mut out[1], 0);
+                        moved.z.store(&mut out[2], 0);
+                        for axis in 0..3 {
+                            let (got, want) = (out[axis][0], expected[axis]);
+                            assert!((got - want).abs() <= 4.0 * f32::EPSILON * want.abs(), "{got} for {want}");
+                            // No nearer to the surface than the scalar form, up to the last bit.
+                            assert!((got - p[axis]) * ng[axis] >= (want - p[axis]) * ng[axis] * 0.99);
+                        }
+                    }
+                }
+            }
+        }
+        at_all_levels(Check);
+    }
 }
