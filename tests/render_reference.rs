@@ -77,5 +77,5 @@ fn cornell_box_has_mitsubas_mean() {
 
 #[test]
 fn three_punctual_lights_have_mitsubas_mean() {
-    check("punctual", 256);
+    check("punctual", 1024);
 }
