@@ -53,7 +53,7 @@ pub struct BlockTest {
 /// square is what the noise adds to a relMSE.
 ///
 /// Per block and channel: Student's t of mean over seeds - reference. Its variance is that of the seeds' means, the
-/// reference's ([`reference_spread`]) and [`ROUNDING`], degrees of freedom after Satterthwaite. A block with a pixel that
+/// reference's (`reference_spread`) and [`ROUNDING`], degrees of freedom after Satterthwaite. A block with a pixel that
 /// is not finite is rejected; one without any difference has p = 1.
 pub fn block_test(pictures: &[Picture], reference: &Picture, reference_rel_se: f64) -> BlockTest {
     let denominators = denominators(reference);
