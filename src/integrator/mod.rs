@@ -1,4 +1,4 @@
-//! The path tracer as a batched wavefront: [`wave`] is the loop, [`pool`] the state of the paths, [`shade`] one vertex.
+//! The path tracer as a batched wavefront: `wave` is the loop, `pool` the state of the paths, `shade` one vertex.
 //!
 //! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.

@@ -1,7 +1,7 @@
 //! Random numbers as a pure function of (seed, frame, pixel, sample, dimension): no generator state.
 //!
 //! Dimensions are addressed by name ([`dims`]), never consumed in order, so a skipped feature changes no other sample.
-//! The first vertices of a path take Owen-scrambled Sobol points ([`sobol`]), the rest a counter hash.
+//! The first vertices of a path take Owen-scrambled Sobol points (`sobol`), the rest a counter hash.
 
 pub mod dims;
 mod hash;

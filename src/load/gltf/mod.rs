@@ -1,7 +1,7 @@
 //! glTF 2.0, through the typed JSON of the `gltf` crate but with our own files, buffers, images and validation.
 //!
-//! A file is parsed into a [`document::Document`], checked as far as every scene needs it ([`check`],
-//! [`extensions`]), and then walked from the chosen scene's root nodes: only what is reached is opened and decoded.
+//! A file is parsed into a `document::Document`, checked as far as every scene needs it (`check`,
+//! `extensions`), and then walked from the chosen scene's root nodes: only what is reached is opened and decoded.
 //! One file per kind of object; every error names the JSON pointer of what is wrong.
 
 mod accessor;
