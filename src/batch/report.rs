@@ -61,6 +61,9 @@ pub struct ImageReport {
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
+    /// Said to the user, no cause for concern, not part of the JSON.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 /// Files written; null where none was.

@@ -6,7 +6,7 @@ use super::names::NameTemplate;
 use super::output::{WriteError, check_writable, write_atomic};
 use super::picture::{FileOptions, exr_bytes, png_bytes};
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Rays, Seconds, Status};
-use super::size::{PictureSize, check_crop, size_for};
+use super::size::{PictureSize, aspect_note, check_crop, size_for};
 use crate::load::{LoadOptions, LoadTimes, load};
 use crate::render::{AccelChoice, Frame, Progress, RenderSettings, render};
 use crate::scene::Scene;
@@ -216,6 +216,7 @@ impl Run<'_> {
         let mut settings = self.settings.render.clone();
         (settings.width, settings.height) = size_for(self.settings.size, scene, camera);
         (image.width, image.height) = (Some(settings.width), Some(settings.height));
+        image.notes.extend(aspect_note(self.settings.size, scene, camera));
         let fitting = settings.crop.map_or(Ok(()), |crop| check_crop(crop, settings.width, settings.height));
         let rendered = fitting
             .and_then(|()| guarded(|| render(scene, camera, &settings, progress).map_err(|error| error.to_string())));
@@ -316,6 +317,7 @@ impl Run<'_> {
             skipped: Vec::new(),
             warnings: Vec::new(),
             accel_note: String::new(),
+            notes: Vec::new(),
         }
     }
 }

@@ -13,14 +13,28 @@ pub enum PictureSize {
     Exact(u32, u32),
 }
 
+/// The aspect ratio that `camera` gives, if it gives one.
+fn aspect_ratio(scene: &Scene, camera: usize) -> Option<f64> {
+    scene.cameras.get(camera).and_then(|camera| match camera.projection {
+        Projection::Perspective { aspect_ratio, .. } => aspect_ratio,
+    })
+}
+
+/// What to say where an exact size overrules the camera's aspect ratio by more than a pixel's worth.
+pub(super) fn aspect_note(size: PictureSize, scene: &Scene, camera: usize) -> Option<String> {
+    let PictureSize::Exact(width, height) = size else { return None };
+    let aspect = aspect_ratio(scene, camera)?;
+    let overruled = (f64::from(width) - aspect * f64::from(height)).abs() > aspect.max(1.0);
+    overruled
+        .then(|| format!("--size {width}x{height} overrules the camera's aspectRatio {aspect:.4}; its yfov is kept"))
+}
+
 /// Width and height of the picture of `camera`.
 pub(super) fn size_for(size: PictureSize, scene: &Scene, camera: usize) -> (u32, u32) {
     match size {
         PictureSize::Exact(width, height) => (width, height),
         PictureSize::Width(width) => {
-            let aspect = scene.cameras.get(camera).and_then(|camera| match camera.projection {
-                Projection::Perspective { aspect_ratio, .. } => aspect_ratio,
-            });
+            let aspect = aspect_ratio(scene, camera);
             let height = f64::from(width) / aspect.unwrap_or(16.0 / 9.0);
             (width, (height.round() as u32).clamp(1, MAX_SIDE))
         }
@@ -56,6 +70,9 @@ mod tests {
         let size = PictureSize::Width(1280);
         assert_eq!([0, 1, 2].map(|i| size_for(size, &scene, i)), [(1280, 640), (1280, 720), (1280, 720)]);
         assert_eq!(size_for(PictureSize::Exact(3, 5), &scene, 0), (3, 5));
+        let note = |w, h, camera| aspect_note(PictureSize::Exact(w, h), &scene, camera);
+        assert!(note(100, 100, 0).is_some_and(|n| n.contains("--size 100x100") && n.contains("2.0000")));
+        assert_eq!([note(101, 50, 0), note(100, 100, 1), aspect_note(size, &scene, 0)], [None, None, None]);
     }
 
     #[test]

@@ -61,14 +61,14 @@ pub enum Verbosity {
 pub struct Reporter {
     style: ProgressStyle,
     verbosity: Verbosity,
-    accel_said: bool,
+    accel_said: Option<&'static str>,
     watcher: Option<Watcher>,
 }
 
 impl Reporter {
     /// A reporter; `auto` is a bar on a terminal and plain lines elsewhere.
     pub fn new(style: ProgressStyle, verbosity: Verbosity) -> Self {
-        Self { style, verbosity, accel_said: false, watcher: None }
+        Self { style, verbosity, accel_said: None, watcher: None }
     }
 
     /// The last line of a run.
@@ -120,8 +120,9 @@ impl Observer for Reporter {
         if self.verbosity == Verbosity::Quiet {
             return;
         }
-        if let (Some(used), false) = (image.accel.used, self.accel_said) {
-            self.accel_said = true;
+        // Once, and again where another backend takes over: `auto` opens no Embree for a scene that needs none.
+        if let (Some(used), true) = (image.accel.used, image.accel.used != self.accel_said) {
+            self.accel_said = Some(used);
             let words = [Some(used), image.accel.version.as_deref(), image.accel.isa.as_deref()];
             let words: Vec<_> = words.into_iter().flatten().collect();
             // The last line of the note is its gist, those before say what was tried.
@@ -136,6 +137,9 @@ impl Observer for Reporter {
             Status::Rendered => say(&line(image)),
             Status::Failed => {}
             other => say(&format!("{}: {}", image.input, status_word(other))),
+        }
+        for note in &image.notes {
+            say(&indented(&format!("note: {}: {note}", image.input)));
         }
         for warning in &image.warnings {
             say(&indented(&format!("warning: {}: {warning}", image.input)));
