@@ -5,7 +5,10 @@
 
 mod support;
 
+use prt::load::{LoadOptions, load};
 use prt::render::{AccelChoice, CropWindow, RenderSettings};
+use prt::scene::Scene;
+use std::path::Path;
 use support::pictures::{settings, shoot};
 use support::scenes;
 
@@ -57,20 +60,39 @@ fn seed_and_frame_change_the_picture() {
     assert!(first != picture("cornell", &RenderSettings { frame: 1, ..base(AccelChoice::Bvh) }));
 }
 
+/// Asserts that windows of a picture show the whole picture's pixels.
+fn assert_crops_equal(what: &str, scene: &Scene, base: &RenderSettings) {
+    let whole = bits(&shoot(scene, base).pixels);
+    for (x, y, width, height) in [(0, 0, 1, 1), (5, 3, 16, 9), (36, 28, 1, 1), (0, 13, 37, 2), (20, 0, 17, 29)] {
+        let window = CropWindow { x, y, width, height };
+        let frame = shoot(scene, &RenderSettings { crop: Some(window), threads: Some(3), ..base.clone() });
+        assert_eq!((frame.width, frame.height, frame.window), (WIDTH, HEIGHT, window));
+        let part: Vec<_> = (y..y + height)
+            .flat_map(|row| (x..x + width).map(move |column| (row * WIDTH + column) as usize))
+            .map(|i| whole[i])
+            .collect();
+        assert!(bits(&frame.pixels) == part, "{what}, {window:?}");
+    }
+}
+
 #[test]
 fn cropped_pixels_equal_those_of_the_whole_picture() {
     for accel in BACKENDS {
-        let whole = picture("cornell", &base(accel));
-        for (x, y, width, height) in [(0, 0, 1, 1), (5, 3, 16, 9), (36, 28, 1, 1), (0, 13, 37, 2), (20, 0, 17, 29)] {
-            let window = CropWindow { x, y, width, height };
-            let settings = RenderSettings { crop: Some(window), threads: Some(3), ..base(accel) };
-            let frame = shoot(&scenes::reference("cornell"), &settings);
-            assert_eq!((frame.width, frame.height, frame.window), (WIDTH, HEIGHT, window));
-            let part: Vec<_> = (y..y + height)
-                .flat_map(|row| (x..x + width).map(move |column| (row * WIDTH + column) as usize))
-                .map(|i| whole[i])
-                .collect();
-            assert!(bits(&frame.pixels) == part, "{accel:?}, {window:?}");
+        assert_crops_equal(&format!("cornell, {accel:?}"), &scenes::reference("cornell"), &base(accel));
+    }
+}
+
+#[test]
+fn cropped_pixels_are_equal_where_materials_are_mixed() {
+    // Lambertian walls beside glossy things: a lane must not notice what its neighbours are made of.
+    for name in ["knot.gltf", "wall.gltf"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        let (scene, _) = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        for accel in [AccelChoice::Auto, AccelChoice::Bvh] {
+            for lanes in [None, Some(8), Some(1)] {
+                let settings = RenderSettings { lanes, ..base(accel) };
+                assert_crops_equal(&format!("{name}, {accel:?}, {lanes:?} lanes"), &scene, &settings);
+            }
         }
     }
 }

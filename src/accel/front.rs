@@ -147,12 +147,10 @@ thread_local! {
 impl Onward {
     fn reserve(&mut self, n: usize) {
         if self.rays.capacity() < n {
-            *self = Self {
-                rays: RayBatch::new(n),
-                hits: HitBatch::new(n),
-                from: Vec::with_capacity(n),
-                occluded: vec![0; n],
-            };
+            // A batch rounds its room up; the rest must have as much.
+            let rays = RayBatch::new(n);
+            let room = rays.capacity();
+            *self = Self { rays, hits: HitBatch::new(room), from: Vec::with_capacity(room), occluded: vec![0; room] };
         }
         self.from.clear();
     }

@@ -1,8 +1,9 @@
 //! The film: per pixel sums over blocks of the sample sequence, from which mean and error come.
 //!
-//! A picture's samples are cut into [`BLOCKS`] consecutive blocks. A (tile, block) pair is summed by one worker in f64,
-//! rounded once and stored whole, so no addition depends on which thread did what, and the spread of the block means
-//! tells the error.
+//! A picture's samples are cut into [`BLOCKS`] consecutive blocks. A (tile, block) pair is summed by one worker, rounded
+//! once and stored whole, so no addition depends on which thread did what, and the spread of the block means tells the
+//! error. Sums are compensated f64: paths of a pixel end in another order when a window is rendered, and its pixels must
+//! still be those of the whole picture.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -37,13 +38,35 @@ impl Tile {
 #[derive(Debug)]
 pub struct TileSums {
     /// Per pixel, row by row: R, G, B and the number of samples in them.
-    sums: Vec<([f64; 3], u32)>,
+    sums: Vec<([Sum; 3], u32)>,
+}
+
+/// A sum whose rounding errors are kept beside it (Knuth's two-sum): 106 bits, so that the order of additions does not
+/// show after rounding to f32.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    high: f64,
+    low: f64,
+}
+
+impl Sum {
+    #[inline]
+    fn add(&mut self, value: f64) {
+        let sum = self.high + value;
+        let part = sum - self.high;
+        self.low += (self.high - (sum - part)) + (value - part);
+        self.high = sum;
+    }
+
+    fn rounded(self) -> f32 {
+        (self.high + self.low) as f32
+    }
 }
 
 impl TileSums {
     /// Nothing yet.
     pub fn new(tile: &Tile) -> Self {
-        Self { sums: vec![([0.0; 3], 0); tile.area()] }
+        Self { sums: vec![([Sum::default(); 3], 0); tile.area()] }
     }
 
     /// Adds a finite sample to pixel `pixel` (row by row in the tile).
@@ -51,7 +74,7 @@ impl TileSums {
     pub fn add(&mut self, pixel: u32, radiance: [f32; 3]) {
         let (sum, count) = &mut self.sums[pixel as usize];
         for (s, r) in sum.iter_mut().zip(radiance) {
-            *s += f64::from(r);
+            s.add(f64::from(r));
         }
         *count += 1;
     }
@@ -107,7 +130,8 @@ impl Film {
     /// # Panics
     /// When it was stored before: two workers took one unit.
     pub fn store(&self, i: usize, sums: &TileSums) {
-        let rounded = sums.sums.iter().map(|&([r, g, b], n)| [r as f32, g as f32, b as f32, n as f32]).collect();
+        let rounded =
+            sums.sums.iter().map(|&([r, g, b], n)| [r.rounded(), g.rounded(), b.rounded(), n as f32]).collect();
         assert!(self.sums[i].set(rounded).is_ok(), "each unit is rendered once");
     }
 

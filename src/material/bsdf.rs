@@ -36,7 +36,9 @@ pub struct Bsdf<L: Lanes> {
     specular_pmf: L::F,
     /// The specular lobe is a mirror.
     is_delta: L::M,
-    /// Some lane has a specular lobe at all.
+    /// Lanes with nothing but the diffuse lobe.
+    is_diffuse: L::M,
+    /// Some lane has a specular lobe. Only a shortcut: a lane's bits must not depend on its neighbours.
     has_specular: bool,
 }
 
@@ -85,7 +87,8 @@ impl<L: Lanes> Bsdf<L> {
         let wo = frame.to_local(wo);
         let wo = V3::<L>::new(wo.x, wo.y, wo.z.max(L::F::splat(1e-6)));
         let dielectric = one - metallic;
-        let has_specular = (metallic.gt(zero) | specular.gt(zero)).any();
+        let is_diffuse = !(metallic.gt(zero) | specular.gt(zero));
+        let has_specular = (!is_diffuse).any();
         let specular_pmf = if has_specular {
             // Shares of the albedo at this angle, as if the half vector were the normal.
             let s5 = pow5(one - wo.z.min(one));
@@ -101,7 +104,19 @@ impl<L: Lanes> Bsdf<L> {
         };
         let is_delta = alpha.lt(L::F::splat(DELTA_ALPHA)) & specular_pmf.gt(zero);
         let alpha = alpha.max(L::F::splat(DELTA_ALPHA));
-        Self { frame, wo, base, metallic, f0, weight: specular, alpha, specular_pmf, is_delta, has_specular }
+        Self {
+            frame,
+            wo,
+            base,
+            metallic,
+            f0,
+            weight: specular,
+            alpha,
+            specular_pmf,
+            is_delta,
+            is_diffuse,
+            has_specular,
+        }
     }
 
     /// Fresnel of the metal and of the dielectric layer (before `weight`) at `cos` between view and half vector.
@@ -181,11 +196,12 @@ impl<L: Lanes> Bsdf<L> {
         // Cosine-weighted hemisphere.
         let r = u[0].sqrt();
         let diffuse = V3::<L>::new(r * cos_phi, r * sin_phi, safe_sqrt(one - u[0]));
+        let albedo = self.base.scale(one - self.metallic);
         if !self.has_specular {
             let wi = V3::<L>::new(diffuse.x, diffuse.y, diffuse.z);
             return BsdfSample {
                 wi: self.frame.to_world(wi),
-                weight: self.base.scale(one - self.metallic),
+                weight: albedo,
                 pdf: wi.z * L::F::splat(FRAC_1_PI),
                 valid: wi.z.gt(zero),
             };
@@ -204,7 +220,7 @@ impl<L: Lanes> Bsdf<L> {
         let wi = mirrored.or_else(from_specular, diffuse);
         let above = wi.z.gt(zero);
         let value = self.eval_local(V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12))));
-        let weight = value.f_cos.scale(one / value.pdf);
+        let weight = albedo.or_else(self.is_diffuse, value.f_cos.scale(one / value.pdf));
         // The mirror: reflectance over the probability of having chosen it.
         let mirror = from_specular & self.is_delta;
         let (metal, layer) = self.fresnel(self.wo.z);
