@@ -2,6 +2,8 @@
 //!
 //! Walls stop most rays of an interior, and a box hierarchy spends its first steps on exactly those. A packet of rays
 //! against a short list needs no steps at all. Only rays that may still hit something nearer go on to the backend.
+//! Cornell box (42 triangles, all of them here), CPU time a path on one core: 530 ns to 250 with `bvh` behind, 440 to 250
+//! with Embree's robust 16-packets (AVX-512).
 //!
 //! The test is that of `woop.rs`, with rays in the lanes: plain IEEE operations in a fixed order, no FMA, so every lane
 //! count gives the same bits. Two differences: the permutation and shear are a matrix per ray with zeroes and a one in
