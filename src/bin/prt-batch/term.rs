@@ -212,10 +212,11 @@ fn goes_on(stopped: &Receiver<()>, period: Duration) -> bool {
 
 fn draw_bar(name: &str, progress: &Progress, stopped: &Receiver<()>) {
     const TEMPLATE: &str = "{msg} {wide_bar} {percent:>3} %  {elapsed} of about {duration}";
-    let bar = ProgressBar::new(0).with_style(BarStyle::with_template(TEMPLATE).expect("the template is valid"));
+    // Of length 0 it would show 100 % until the samples are counted.
+    let bar = ProgressBar::new(1).with_style(BarStyle::with_template(TEMPLATE).expect("the template is valid"));
     bar.set_message(name.to_owned());
     while goes_on(stopped, Duration::from_millis(100)) {
-        bar.set_length(progress.total.load(Relaxed));
+        bar.set_length(progress.total.load(Relaxed).max(1));
         bar.set_position(progress.done.load(Relaxed));
     }
     bar.finish_and_clear();
