@@ -9,7 +9,7 @@
 //! count gives the same bits. Two differences: the permutation and shear are a matrix per ray with zeroes and a one in
 //! it (exact), and the nearest of several hits is chosen by `T / det`. Corners shared by triangles are sheared once.
 
-use super::woop::{can_be_hit, exact_edge};
+use super::woop::{can_be_hit, exact_edges};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch, Triangles};
 use simd::{Float, Kernel, Lanes, Level, Mask, Uint, dispatch};
 use std::cell::RefCell;
@@ -381,23 +381,6 @@ fn cross<L: Lanes>(sheared: &Sheared<L>, ids: [u16; 3], active: L::M) -> Option<
     let det = (e0 + e1) + e2;
     let t = ((e0 * at + e1 * bt) + e2 * ct) / det;
     Some(Crossing { t, edges: [e0, e1, e2], corners: [at, bt, ct], inside: inside & t.gt(zero) })
-}
-
-/// [`exact_edge`] in every lane. Rare (rays through edges and corners), so scalar.
-#[cold]
-#[inline(always)]
-fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
-    let mut lanes = [[0.0; 16]; 5];
-    edge.store(&mut lanes[0], 0);
-    a.store(&mut lanes[1], 0);
-    b.store(&mut lanes[2], 0);
-    c.store(&mut lanes[3], 0);
-    d.store(&mut lanes[4], 0);
-    let [mut edge, a, b, c, d] = lanes;
-    for i in 0..L::N {
-        edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
-    }
-    L::F::load(&edge, 0)
 }
 
 struct Intersect<'a> {

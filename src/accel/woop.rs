@@ -10,6 +10,7 @@
 //!   range test before the division: coordinates of 1e18 do not overflow, and `t` stays within the triangle's own range.
 
 use glam::Vec3;
+use simd::{Float, Lanes};
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,9 +110,25 @@ fn one_side(e0: f32, e1: f32, e2: f32) -> bool {
 
 /// `a * b - c * d` with the right sign, if `edge`, its f32 value, is zero.
 #[inline(always)]
-pub(super) fn exact_edge(edge: f32, a: f32, b: f32, c: f32, d: f32) -> f32 {
+fn exact_edge(edge: f32, a: f32, b: f32, c: f32, d: f32) -> f32 {
     // Products of two f32 are exact in f64, so the difference has the sign of the exact one.
     if edge == 0.0 { (f64::from(a) * f64::from(b) - f64::from(c) * f64::from(d)) as f32 } else { edge }
+}
+
+/// [`exact_edge`] in every lane. Rare (rays through edges and corners), so scalar.
+#[inline(always)]
+pub(super) fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
+    let mut lanes = [[0.0; 16]; 5];
+    edge.store(&mut lanes[0], 0);
+    a.store(&mut lanes[1], 0);
+    b.store(&mut lanes[2], 0);
+    c.store(&mut lanes[3], 0);
+    d.store(&mut lanes[4], 0);
+    let [mut edge, a, b, c, d] = lanes;
+    for i in 0..L::N {
+        edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
+    }
+    L::F::load(&edge, 0)
 }
 
 #[cfg(test)]

@@ -184,6 +184,7 @@ mod tests {
         assert_eq!(scene.meshes[0].indices.len(), 1);
     }
 
+    // No input can cause it, so it is a panic that names the invariant, not a load error.
     #[test]
     #[should_panic(expected = "material was added")]
     fn unknown_material_id_is_a_loader_bug() {

@@ -105,11 +105,6 @@ impl TriangleTable {
         self.records.is_empty()
     }
 
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        16 * (self.records.len() + self.attributes.len() + self.tangents.len())
-    }
-
     /// Any triangle with normals or texture coordinates.
     pub fn has_attributes(&self) -> bool {
         !self.attributes.is_empty()

@@ -74,12 +74,7 @@ impl TextureTable {
         Ok(Self { headers, texels })
     }
 
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.texels.len() * 4 + self.headers.len() * 16
-    }
-
-    /// The texture `id` at (`u`, `v`) in the lanes of `active`, whose ids must be of textures; anything elsewhere.
+    /// The texture `id` at (`u`, `v`); a lane whose id is of no texture reads anything.
     #[inline(always)]
     pub fn lookup<L: Lanes>(&self, id: L::U, u: L::F, v: L::F, encoding: Encoding) -> Texel<L> {
         let [first, width, height, flags] = id.records(&self.headers);

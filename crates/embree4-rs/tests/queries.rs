@@ -241,6 +241,7 @@ fn a_batch_of_any_length_equals_its_single_rays() {
     }
 }
 
+// A caller's bug, as with indexing: a panic that names the slice, not an error to handle.
 #[test]
 #[should_panic(expected = "length of RaysSoA::dy must be that of ox")]
 fn slices_of_different_lengths_panic() {

@@ -3,11 +3,8 @@
 use super::node::{Child, Leaves, WIDTH};
 use super::ray::SingleRay;
 use crate::accel::MISS;
-use crate::accel::woop::exact_edge;
+use crate::accel::woop::exact_edges;
 use simd::{Float, Lanes, Mask};
-
-/// Lanes at most.
-const MAX_LANES: usize = 16;
 
 /// The nearest hit so far.
 #[derive(Clone, Copy, Debug)]
@@ -90,22 +87,6 @@ fn corner<L: Lanes>(rows: &[f32], first: usize, n: usize, ray: &SingleRay<L>) ->
 fn one_side<L: Lanes>(e0: L::F, e1: L::F, e2: L::F) -> u32 {
     let zero = L::F::zero();
     (e0.min(e1).min(e2).ge(zero) | e0.max(e1).max(e2).le(zero)).bits()
-}
-
-/// [`exact_edge`] in every lane. Rare (rays through edges and vertices), so scalar.
-#[inline(always)]
-fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
-    let mut lanes = [[0.0; MAX_LANES]; 5];
-    edge.store(&mut lanes[0], 0);
-    a.store(&mut lanes[1], 0);
-    b.store(&mut lanes[2], 0);
-    c.store(&mut lanes[3], 0);
-    d.store(&mut lanes[4], 0);
-    let [mut edge, a, b, c, d] = lanes;
-    for i in 0..L::N {
-        edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
-    }
-    L::F::load(&edge, 0)
 }
 
 /// Updates `nearest` by the triangles of `leaf`; true if there was a nearer one or, at equal t, one of lower index.
