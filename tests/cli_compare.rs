@@ -1,6 +1,6 @@
 //! `prt-batch compare` as scripts meet it: exit codes and messages, on pictures made here.
 
-use prt::image::exr::{ExrCamera, ExrCompression, ExrPicture, encode};
+use prt::image::exr::{ExrCamera, ExrCompression, ExrPicture, ExrProjection, encode};
 use std::path::Path;
 use std::process::Command;
 
@@ -13,7 +13,11 @@ fn write(path: &Path, origin: [u32; 2], size: [u32; 2], value: impl Fn(u32, u32)
         .flat_map(|y| (origin[0]..origin[0] + size[0]).map(move |x| (x, y)))
         .map(|(x, y)| [value(x, y); 3])
         .collect();
-    let camera = ExrCamera { world_from_camera: glam::DMat4::IDENTITY, yfov: 1.0, aspect_ratio: 1.0 };
+    let camera = ExrCamera {
+        world_from_camera: glam::DMat4::IDENTITY,
+        projection: ExrProjection::Perspective { yfov: 1.0 },
+        aspect_ratio: 1.0,
+    };
     let picture =
         ExrPicture { display_size: [SIZE, SIZE], origin, size, pixels: &pixels, camera, attributes: Vec::new() };
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();

@@ -6,7 +6,7 @@ use gltf_support::{INDICES, POSITIONS, Sample, UVS, base64, load_bytes, png};
 use prt::camera::Projection;
 use prt::light::Light;
 use prt::load::{LoadOptions, load};
-use prt::texture::{Filter, Wrap};
+use prt::texture::{Filter, Texels, Wrap};
 use serde_json::json;
 use std::f32::consts::FRAC_PI_4;
 use tempfile::TempDir;
@@ -20,7 +20,7 @@ fn sample_is_read_whole() {
     let mesh = &scene.meshes[0];
     assert_eq!(mesh.positions, POSITIONS);
     assert_eq!(mesh.normals.as_deref(), Some(&[[0.0, 0.0, 1.0]; 4][..]));
-    assert_eq!(mesh.uvs.as_deref(), Some(&UVS[..]));
+    assert_eq!(mesh.uv_sets, [UVS]);
     assert_eq!(mesh.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 4][..]));
     assert_eq!(mesh.indices.as_flattened(), INDICES.map(u32::from));
 
@@ -39,11 +39,11 @@ fn sample_is_read_whole() {
         (texture.wrap_u, texture.wrap_v, texture.filter),
         (Wrap::ClampToEdge, Wrap::MirroredRepeat, Filter::Nearest)
     );
-    assert_eq!(scene.images[0].texels, [[255, 0, 0, 255], [0, 255, 0, 255]]);
+    assert_eq!(scene.images[0].texels, Texels::Rgba8(vec![[255, 0, 0, 255], [0, 255, 0, 255]]));
 
     assert_eq!(scene.cameras[0].name, "eye");
     assert_eq!(scene.cameras[0].world_from_camera.w_axis.truncate().to_array(), [0.0, 0.0, 5.0]);
-    let Projection::Perspective { yfov, aspect_ratio } = scene.cameras[0].projection;
+    let Projection::Perspective { yfov, aspect_ratio } = scene.cameras[0].projection else { panic!("perspective") };
     assert_eq!((yfov, aspect_ratio), (0.5, None));
     let expected = Light::Spot { intensity: [10.0, 5.0, 2.5], inner_cone: 0.0, outer_cone: FRAC_PI_4 };
     assert_eq!(scene.lights[0].light, expected);
@@ -104,7 +104,7 @@ fn interleaved_vertices_are_read_with_their_stride() {
         .load()
         .unwrap();
     assert_eq!(scene.meshes[0].positions, POSITIONS);
-    assert_eq!(scene.meshes[0].uvs.as_deref(), Some(&UVS[..]));
+    assert_eq!(scene.meshes[0].uv_sets, [UVS]);
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn normalized_integer_uvs_become_zero_to_one() {
         .poke(96, &bytes)
         .load()
         .unwrap();
-    assert_eq!(scene.meshes[0].uvs.as_deref(), Some(&UVS[..]));
+    assert_eq!(scene.meshes[0].uv_sets, [UVS]);
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn cameras_and_lights_lose_the_scale_of_their_nodes() {
 fn mesh_without_material_gets_the_default_and_no_uvs() {
     let scene = Sample::new().remove("/meshes/0/primitives/0/material").load().unwrap();
     let mesh = &scene.meshes[0];
-    assert!(mesh.uvs.is_none() && mesh.tangents.is_none() && mesh.normals.is_some());
+    assert!(mesh.uv_sets.is_empty() && mesh.tangents.is_none() && mesh.normals.is_some());
     let material = &scene.materials[mesh.material.index()];
     assert_eq!((material.base_color.factor, material.metallic.factor), ([1.0; 3], 1.0));
     let skipped: Vec<_> = scene.skipped.iter().map(|s| s.what.as_str()).collect();
@@ -191,7 +191,7 @@ fn images_come_from_files_with_escaped_names_and_wrong_media_types() {
     std::fs::write(dir.path().join("maps/a b.jpg"), png(&[1, 2, 3, 4], 1, 1)).unwrap();
     let sample = Sample::new().set("/images/0", json!({"uri": "maps/./a%20b.jpg", "mimeType": "image/jpeg"}));
     let (scene, _) = load(&sample.write(dir.path()), &LoadOptions::default()).unwrap();
-    assert_eq!(scene.images[0].texels, [[1, 2, 3, 4]]);
+    assert_eq!(scene.images[0].texels, Texels::Rgba8(vec![[1, 2, 3, 4]]));
     assert!(scene.warnings[0].contains("said to be JPEG but is PNG"), "{:?}", scene.warnings);
 }
 

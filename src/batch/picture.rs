@@ -1,7 +1,8 @@
 //! A [`Frame`] as the bytes of files.
 
+use crate::camera::Projection;
 use crate::color::ToneMap;
-use crate::image::exr::{self, ExrCamera, ExrCompression, ExrPicture, ExrValue};
+use crate::image::exr::{self, ExrCamera, ExrCompression, ExrPicture, ExrProjection, ExrValue};
 use crate::image::png;
 use crate::render::{Brdf, Frame, RenderSettings};
 
@@ -36,7 +37,10 @@ pub(super) fn exr_bytes(
     let window = frame.window;
     let camera = ExrCamera {
         world_from_camera: frame.camera.world_from_camera,
-        yfov: frame.camera.yfov,
+        projection: match frame.camera.projection {
+            Projection::Perspective { yfov, .. } => ExrProjection::Perspective { yfov },
+            Projection::Orthographic { ymag, .. } => ExrProjection::Orthographic { half_height: ymag },
+        },
         aspect_ratio: frame.camera.aspect_ratio,
     };
     let picture = ExrPicture {
@@ -114,7 +118,11 @@ mod tests {
             accel: AccelReport { requested: "auto", used: "bvh", ..AccelReport::default() },
             ..RenderStats::default()
         };
-        let camera = FrameCamera { world_from_camera: glam::DMat4::IDENTITY, yfov: 1.0, aspect_ratio: 2.0 };
+        let camera = FrameCamera {
+            world_from_camera: glam::DMat4::IDENTITY,
+            projection: Projection::Perspective { yfov: 1.0, aspect_ratio: None },
+            aspect_ratio: 2.0,
+        };
         let window = CropWindow { x: 3, y: 2, width: 2, height: 1 };
         let pixels = vec![[0.25, 0.5, 1.0], [f32::NAN, f32::INFINITY, -1.0]];
         Frame { width: 8, height: 4, window, pixels, spp: 16, camera, stats }

@@ -27,7 +27,11 @@ fn frame() -> Frame {
         window: CropWindow { x: 0, y: 0, width: 4, height: 2 },
         pixels: vec![[0.5; 3]; 8],
         spp: 4,
-        camera: FrameCamera { world_from_camera: glam::DMat4::IDENTITY, yfov: 1.0, aspect_ratio: 2.0 },
+        camera: FrameCamera {
+            world_from_camera: glam::DMat4::IDENTITY,
+            projection: crate::camera::Projection::Perspective { yfov: 1.0, aspect_ratio: None },
+            aspect_ratio: 2.0,
+        },
         stats: RenderStats { camera_rays: 30, shadow_rays: 12, render_seconds: 2e-6, ..RenderStats::default() },
     }
 }

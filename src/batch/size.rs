@@ -17,6 +17,7 @@ pub enum PictureSize {
 fn aspect_ratio(scene: &Scene, camera: usize) -> Option<f64> {
     scene.cameras.get(camera).and_then(|camera| match camera.projection {
         Projection::Perspective { aspect_ratio, .. } => aspect_ratio,
+        Projection::Orthographic { xmag, ymag } => Some(xmag / ymag),
     })
 }
 

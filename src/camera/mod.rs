@@ -29,4 +29,11 @@ pub enum Projection {
         /// Width over height as the file has it; yields to the picture's own size.
         aspect_ratio: Option<f64>,
     },
+    /// Parallel rays.
+    Orthographic {
+        /// Half of the width of what is seen, metres, > 0; yields to the picture's own shape.
+        xmag: f64,
+        /// Half of the height of what is seen, metres, > 0.
+        ymag: f64,
+    },
 }

@@ -5,10 +5,10 @@ use crate::math::V3;
 use glam::{DMat4, DVec3};
 use simd::{Float, Lanes};
 
-/// A pinhole camera for one picture size, in the prepared scene's space.
+/// A pinhole or orthographic camera for one picture size, in the prepared scene's space.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraRays {
-    /// The pinhole, metres.
+    /// The pinhole, or the centre of the plane where parallel rays start; metres.
     origin: [f32; 3],
     /// Direction through the picture's centre.
     forward: [f32; 3],
@@ -18,23 +18,28 @@ pub struct CameraRays {
     down: [f32; 3],
     /// 2 / width and 2 / height.
     per_pixel: [f32; 2],
+    /// Rays start on the plane instead of at a point.
+    is_parallel: bool,
 }
 
 impl CameraRays {
     /// A camera for a picture of `width` x `height` pixels in a scene recentred on `origin` (f64, world metres). The
-    /// vertical field of view is kept; the horizontal one follows from the picture's shape.
+    /// vertical field of view (or height) is kept; the horizontal one follows from the picture's shape.
     pub fn new(camera: &Camera, width: u32, height: u32, origin: DVec3) -> Self {
-        let Projection::Perspective { yfov, .. } = camera.projection;
+        let (half_height, is_parallel) = match camera.projection {
+            Projection::Perspective { yfov, .. } => ((0.5 * yfov).tan(), false),
+            Projection::Orthographic { ymag, .. } => (ymag, true),
+        };
         let m: &DMat4 = &camera.world_from_camera;
-        let tan = (0.5 * yfov).tan();
         let aspect = f64::from(width) / f64::from(height);
         let axis = |v: DVec3| v.as_vec3().to_array();
         Self {
             origin: axis(m.w_axis.truncate() - origin),
             forward: axis(-m.z_axis.truncate()),
-            right: axis(m.x_axis.truncate() * tan * aspect),
-            down: axis(-m.y_axis.truncate() * tan),
+            right: axis(m.x_axis.truncate() * half_height * aspect),
+            down: axis(-m.y_axis.truncate() * half_height),
             per_pixel: [(2.0 / f64::from(width)) as f32, (2.0 / f64::from(height)) as f32],
+            is_parallel,
         }
     }
 
@@ -46,7 +51,11 @@ impl CameraRays {
         let sy = y.mul_add(L::F::splat(self.per_pixel[1]), -one);
         let right = V3::<L>::splat(self.right);
         let down = V3::<L>::splat(self.down);
-        let d = right.mul_add(sx, down.mul_add(sy, V3::splat(self.forward)));
-        (V3::splat(self.origin), d.normalized())
+        let (origin, forward) = (V3::<L>::splat(self.origin), V3::<L>::splat(self.forward));
+        if self.is_parallel {
+            return (right.mul_add(sx, down.mul_add(sy, origin)), forward);
+        }
+        let d = right.mul_add(sx, down.mul_add(sy, forward));
+        (origin, d.normalized())
     }
 }

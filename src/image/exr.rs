@@ -44,10 +44,25 @@ pub struct ExrPicture<'a> {
 pub struct ExrCamera {
     /// Rigid, right-handed, looking along -Z, for column vectors; metres.
     pub world_from_camera: DMat4,
-    /// Vertical field of view, radians.
-    pub yfov: f64,
+    /// How points become pixels.
+    pub projection: ExrProjection,
     /// Width over height of the display window.
     pub aspect_ratio: f64,
+}
+
+/// How points become pixels.
+#[derive(Clone, Copy, Debug)]
+pub enum ExrProjection {
+    /// A pinhole.
+    Perspective {
+        /// Vertical field of view, radians.
+        yfov: f64,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Half of the height of what is seen, metres.
+        half_height: f64,
+    },
 }
 
 /// Value of an attribute.
@@ -138,7 +153,20 @@ const NDC_NEAR: f64 = 0.01;
 impl CameraMatrices {
     fn new(camera: &ExrCamera) -> Self {
         let camera_from_world = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0)) * camera.world_from_camera.inverse();
-        let half_height = (camera.yfov * 0.5).tan();
+        let half_height = match camera.projection {
+            ExrProjection::Perspective { yfov } => (yfov * 0.5).tan(),
+            ExrProjection::Orthographic { half_height } => half_height,
+        };
+        if matches!(camera.projection, ExrProjection::Orthographic { .. }) {
+            // x_ndc = 1/2 + x / (2 half_width), y_ndc = 1/2 - y / (2 half_height), w = 1, depth = z - near in metres.
+            let ndc_from_camera = DMat4::from_cols(
+                DVec4::new(0.5 / (half_height * camera.aspect_ratio), 0.0, 0.0, 0.0),
+                DVec4::new(0.0, -0.5 / half_height, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, 1.0, 0.0),
+                DVec4::new(0.5, 0.5, -NDC_NEAR, 1.0),
+            );
+            return Self { camera_from_world, ndc_from_world: ndc_from_camera * camera_from_world };
+        }
         // x_ndc = 1/2 + x / (2 z half_width), y_ndc = 1/2 - y / (2 z half_height), with w = z.
         let ndc_from_camera = DMat4::from_cols(
             DVec4::new(0.5 / (half_height * camera.aspect_ratio), 0.0, 0.0, 0.0),

@@ -13,7 +13,7 @@ fn picture(width: u32, height: u32, pixels: &[[f32; 3]]) -> ExrPicture<'_> {
     let rotation = glam::DQuat::from_rotation_y(0.5) * glam::DQuat::from_rotation_x(-0.25);
     let camera = ExrCamera {
         world_from_camera: DMat4::from_rotation_translation(rotation, DVec3::new(3.0, 2.0, -1.0)),
-        yfov: 0.7,
+        projection: ExrProjection::Perspective { yfov: 0.7 },
         aspect_ratio: f64::from(width) / f64::from(height),
     };
     let attributes = vec![

@@ -1,12 +1,13 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
+use super::coverage::{behind, passes};
 use super::pool::PathPool;
 use super::wave::Counters;
 use super::{PathTracer, SceneTables};
 use crate::accel::MISS;
-use crate::material::bsdf::Bsdf;
-use crate::math::{Frame, V3, robust};
-use crate::sampler::{Key, dims};
+use crate::material::bsdf::{Bsdf, Surface};
+use crate::math::{Frame, UvSets, V3, robust};
+use crate::sampler::{Key, coverage_key, dims};
 use crate::shape::table::{NONE, Triangle};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
 
@@ -34,13 +35,27 @@ struct Interaction<L: Lanes> {
     ng: V3<L>,
     /// The front side was hit.
     front: L::M,
-    /// Texture coordinate.
-    uv: [L::F; 2],
+    /// Texture coordinates.
+    uvs: UvSets<L>,
+    /// Vertex colour; white where there is none.
+    color: V3<L>,
+    /// Opacity of the vertex colour.
+    opacity: L::F,
     /// Interpolated normal as given (front side up, not normalised) and where there is one.
     normal: V3<L>,
     has_normal: L::M,
     /// Barycentric coordinates.
     b: [L::F; 2],
+}
+
+/// Where the paths go on.
+struct Next<L: Lanes> {
+    origin: V3<L>,
+    direction: V3<L>,
+    beta: V3<L>,
+    /// Density of the direction, 1/sr.
+    pdf: L::F,
+    depth: L::U,
 }
 
 impl Kernel for Shade<'_, '_> {
@@ -63,7 +78,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let tables = tracer.tables;
     let slot = L::U::load(&pool.slot, at);
     let primitive = L::U::load(&pool.hits.primitive, at);
-    let hit = active & !primitive.eq(L::U::splat(MISS));
+    let mut hit = active & !primitive.eq(L::U::splat(MISS));
     if !hit.any() {
         slot.compress(active, &mut pool.dead, pool.n_dead);
         pool.n_dead += active.count();
@@ -72,14 +87,30 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let depth = L::U::load(&pool.depth, at);
     let beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
     let si = interact::<L>(tables, pool, at, primitive, hit);
+    let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
+    let (mut t, mut through) = (L::F::load(&pool.hits.t, at), L::M::from_bits(0));
+    if tables.materials.has_alpha() {
+        t = t + L::F::load(&pool.travelled, at);
+        let key = coverage_key::<L>(key.pixel, key.sample, depth);
+        through = passes::<L>(tables, si.triangle.material, &si.uvs, si.opacity, key, primitive, hit);
+        hit = hit & !through;
+    }
+    if tables.materials.has_unlit() {
+        let unlit = tables.materials.unlit::<L>(si.triangle.material, hit);
+        if unlit.any() {
+            // Only to rays that show things as they are: from the camera or a mirror.
+            let seen = unlit & !L::F::load(&pool.prev_pdf, at).is_finite();
+            let color = surface(tables, &si, seen).base;
+            add_lanes::<L>(pool, slot, beta * color, seen);
+            hit = hit & !unlit;
+        }
+    }
 
     if tables.materials.is_emissive() {
-        let [u, v] = si.uv;
-        let le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, u, v, hit);
+        let le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, &si.uvs, hit);
         let lit = hit & le.max_component().gt(L::F::zero());
         if lit.any() {
             // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2).
-            let t = L::F::load(&pool.hits.t, at);
             let pdf_light = si.triangle.light_density * t * t / si.wo.dot(si.triangle.ng).abs();
             let ratio = pdf_light / L::F::load(&pool.prev_pdf, at);
             let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
@@ -93,13 +124,16 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
     let scatters = hit & allowed;
     let bsdf = closure::<L>(tables, &si, scatters);
-    let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
     // Off the surface on the viewer's side; reflection only, so all rays leave there.
     let start = robust::offset_point(si.p, si.ng, si.triangle.offset_length());
 
     if !tables.lights.is_empty() {
         let u = key.group(depth + depth + L::U::splat(dims::FIRST_LIGHT));
-        queue_light_sample::<L>(tables, pool, &si, &bsdf, start, beta, slot, [u[0], u[1], u[2]], scatters);
+        let to = pool.n_shadow;
+        let cast = queue_light_sample::<L>(tables, pool, &si, &bsdf, start, beta, slot, [u[0], u[1], u[2]], scatters);
+        if tables.materials.has_alpha() {
+            coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow_key, to);
+        }
     }
 
     let u = key.group(depth + depth + L::U::splat(dims::FIRST_BSDF));
@@ -122,21 +156,35 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         beta = beta.scale(L::F::one() / survival).or_else(rolls, beta);
     }
 
+    let mut next = Next { origin: start, direction: sample.wi, beta, pdf: sample.pdf, depth: depth + L::U::splat(1) };
+    let to = pool.n;
+    if tables.materials.has_alpha() {
+        // Rays that pass go on as they were, from behind the surface.
+        next = Next {
+            origin: behind(&si.triangle, si.p, -si.wo).or_else(through, next.origin),
+            direction: (-si.wo).or_else(through, next.direction),
+            beta: load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at).or_else(through, next.beta),
+            pdf: L::F::load(&pool.prev_pdf, at).or_else(through, next.pdf),
+            depth: depth.or_else(through, next.depth),
+        };
+        alive = alive | through;
+        t.masked(through).compress(alive, &mut pool.travelled, to);
+    }
+
     slot.compress(active & !alive, &mut pool.dead, pool.n_dead);
     pool.n_dead += (active & !alive).count();
-    let to = pool.n;
-    start.x.compress(alive, &mut pool.rays.ox, to);
-    start.y.compress(alive, &mut pool.rays.oy, to);
-    start.z.compress(alive, &mut pool.rays.oz, to);
-    sample.wi.x.compress(alive, &mut pool.rays.dx, to);
-    sample.wi.y.compress(alive, &mut pool.rays.dy, to);
-    sample.wi.z.compress(alive, &mut pool.rays.dz, to);
+    next.origin.x.compress(alive, &mut pool.rays.ox, to);
+    next.origin.y.compress(alive, &mut pool.rays.oy, to);
+    next.origin.z.compress(alive, &mut pool.rays.oz, to);
+    next.direction.x.compress(alive, &mut pool.rays.dx, to);
+    next.direction.y.compress(alive, &mut pool.rays.dy, to);
+    next.direction.z.compress(alive, &mut pool.rays.dz, to);
     L::F::splat(f32::INFINITY).store(&mut pool.rays.t_max, to);
-    beta.x.compress(alive, &mut pool.beta[0], to);
-    beta.y.compress(alive, &mut pool.beta[1], to);
-    beta.z.compress(alive, &mut pool.beta[2], to);
-    sample.pdf.compress(alive, &mut pool.prev_pdf, to);
-    (depth + L::U::splat(1)).compress(alive, &mut pool.depth, to);
+    next.beta.x.compress(alive, &mut pool.beta[0], to);
+    next.beta.y.compress(alive, &mut pool.beta[1], to);
+    next.beta.z.compress(alive, &mut pool.beta[2], to);
+    next.pdf.compress(alive, &mut pool.prev_pdf, to);
+    next.depth.compress(alive, &mut pool.depth, to);
     key.pixel.compress(alive, &mut pool.seed, to);
     key.sample.compress(alive, &mut pool.sample, to);
     slot.compress(alive, &mut pool.slot, to);
@@ -152,24 +200,38 @@ fn interact<L: Lanes>(tables: &SceneTables, pool: &PathPool, at: usize, primitiv
     let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
     let front = wo.dot(triangle.ng).gt(zero);
     let ng = triangle.ng.or_else(front, -triangle.ng);
-    let (mut uv, mut normal, mut has_normal) = ([zero, zero], triangle.ng, L::M::from_bits(0));
+    let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, L::M::from_bits(0));
+    let (mut color, mut opacity) = (V3::splat([1.0; 3]), L::F::one());
     if tables.triangles.has_attributes() {
         let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
         if has.any() {
             let a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
-            uv = [a.u.masked(has), a.v.masked(has)];
+            uvs = a.uvs.masked(has);
+            if tables.triangles.has_colors() {
+                (color, opacity) = (a.color.or_else(has, color), a.opacity.or_else(has, opacity));
+            }
             has_normal = has & a.has_normal;
             normal = a.normal.or_else(has_normal, normal);
         }
     }
-    Interaction { p: triangle.point(b[0], b[1]), triangle, wo, ng, front, uv, normal, has_normal, b }
+    Interaction { p: triangle.point(b[0], b[1]), triangle, wo, ng, front, uvs, color, opacity, normal, has_normal, b }
+}
+
+/// Textures and vertex colours applied.
+#[inline(always)]
+fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Surface<L> {
+    let mut surface = tables.materials.surface(&tables.textures, si.triangle.material, &si.uvs, active);
+    if tables.triangles.has_colors() {
+        // Exporters write colours above 1; a base colour is a reflectance.
+        surface.base = (surface.base * si.color).min(V3::splat([1.0; 3]));
+    }
+    surface
 }
 
 /// Textures applied, shading frame found: what is left is directions.
 #[inline(always)]
 fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<L> {
-    let [u, v] = si.uv;
-    let surface = tables.materials.surface(&tables.textures, si.triangle.material, u, v, active);
+    let surface = surface(tables, si, active);
     let mut ns = si.ng;
     if tables.triangles.has_attributes() && si.has_normal.any() {
         let mut normal = si.normal.normalized();
@@ -195,8 +257,7 @@ fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) ->
 #[inline(always)]
 fn map_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L>, mapped: L::M) -> V3<L> {
     let (t, handedness) = tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1]);
-    let [u, v] = si.uv;
-    let (m, has) = tables.materials.normal_map::<L>(&tables.textures, si.triangle.material, u, v, mapped);
+    let (m, has) = tables.materials.normal_map::<L>(&tables.textures, si.triangle.material, &si.uvs, mapped);
     // glTF 3.7.2.1: bitangent = cross(normal, tangent) x handedness. The tangent is used as interpolated, made unit.
     let t = (t - normal.scale(normal.dot(t))).normalized();
     let b = normal.cross(t).scale(handedness);
@@ -204,7 +265,7 @@ fn map_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L>
     n.or_else(has & n.is_finite(), normal)
 }
 
-/// Next event estimation: queues a shadow ray with its finished contribution.
+/// Next event estimation: queues a shadow ray with its finished contribution; the lanes that have one.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "the vertex's state, spread over lanes")]
 fn queue_light_sample<L: Lanes>(
@@ -217,7 +278,7 @@ fn queue_light_sample<L: Lanes>(
     slot: L::U,
     u: [L::F; 3],
     scatters: L::M,
-) {
+) -> L::M {
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample::<L>(si.p, u, &tables.triangles, &tables.materials, &tables.textures);
     let value = bsdf.eval(light.wi);
@@ -245,16 +306,17 @@ fn queue_light_sample<L: Lanes>(
     arriving.y.compress(cast, &mut pool.shadow_radiance[1], to);
     arriving.z.compress(cast, &mut pool.shadow_radiance[2], to);
     pool.n_shadow += cast.count();
+    cast
 }
 
 #[inline(always)]
-fn load3<L: Lanes>(x: &[f32], y: &[f32], z: &[f32], at: usize) -> V3<L> {
+pub(super) fn load3<L: Lanes>(x: &[f32], y: &[f32], z: &[f32], at: usize) -> V3<L> {
     V3::new(L::F::load(x, at), L::F::load(y, at), L::F::load(z, at))
 }
 
 /// Adds to the radiance of the slots of `lanes`, one by one: slots differ, but memory is not gathered this rarely.
 #[inline(always)]
-fn add_lanes<L: Lanes>(pool: &mut PathPool, slot: L::U, radiance: V3<L>, lanes: L::M) {
+pub(super) fn add_lanes<L: Lanes>(pool: &mut PathPool, slot: L::U, radiance: V3<L>, lanes: L::M) {
     let (mut slots, mut rgb) = ([0; 16], [[0.0; 16]; 3]);
     slot.store(&mut slots, 0);
     radiance.x.store(&mut rgb[0], 0);

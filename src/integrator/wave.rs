@@ -1,6 +1,7 @@
 //! The loop: refill with camera rays, intersect, shade, test shadow rays, add.
 
 use super::PathTracer;
+use super::coverage::ShadowThrough;
 use super::pool::{POOL, PathPool};
 use super::shade::Shade;
 use crate::math::V3;
@@ -77,14 +78,10 @@ impl PathTracer<'_> {
 
             dispatch_large(self.level, Shade { tracer: self, pool, counters });
 
-            let n_shadow = pool.n_shadow;
-            counters.shadow += n_shadow as u64;
-            self.accel.occluded(&pool.shadow, n_shadow, &mut pool.occluded);
-            for i in 0..n_shadow {
-                if pool.occluded[i] == 0 {
-                    let [r, g, b] = &pool.shadow_radiance;
-                    pool.add(pool.shadow_slot[i], [r[i], g[i], b[i]]);
-                }
+            if self.tables.materials.has_alpha() {
+                self.shadow_through(pool, counters);
+            } else {
+                self.shadow(pool, counters);
             }
             for i in 0..pool.n_dead {
                 let slot = pool.dead[i];
@@ -98,6 +95,30 @@ impl PathTracer<'_> {
                 pool.free.push(slot);
             }
             pool.n_dead = 0;
+        }
+    }
+}
+
+impl PathTracer<'_> {
+    /// Adds what arrives along the queued shadow rays.
+    fn shadow(&self, pool: &mut PathPool, counters: &mut Counters) {
+        let n_shadow = pool.n_shadow;
+        counters.shadow += n_shadow as u64;
+        self.accel.occluded(&pool.shadow, n_shadow, &mut pool.occluded);
+        for i in 0..n_shadow {
+            if pool.occluded[i] == 0 {
+                let [r, g, b] = &pool.shadow_radiance;
+                pool.add(pool.shadow_slot[i], [r[i], g[i], b[i]]);
+            }
+        }
+    }
+
+    /// The same in a scene with surfaces that rays may pass: from one to the next, until all are decided.
+    fn shadow_through(&self, pool: &mut PathPool, counters: &mut Counters) {
+        while pool.n_shadow > 0 {
+            counters.shadow += pool.n_shadow as u64;
+            self.accel.intersect(&pool.shadow, 0..pool.n_shadow, false, &mut pool.shadow_hits);
+            dispatch_large(self.level, ShadowThrough { tables: self.tables, pool });
         }
     }
 }
@@ -130,6 +151,7 @@ impl Feed {
                 pool.sample[n] = self.sample;
                 pool.depth[n] = 0;
                 pool.prev_pdf[n] = f32::INFINITY;
+                pool.travelled[n] = 0.0;
                 pool.rays.ox[n] = x as f32 + 0.5;
                 pool.rays.oy[n] = y as f32 + 0.5;
                 pool.rays.t_max[n] = f32::INFINITY;

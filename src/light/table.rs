@@ -4,7 +4,7 @@
 //! by inverting the distribution function (not an alias table, which would undo the stratification of the number).
 
 use crate::material::table::MaterialTable;
-use crate::math::{V3, robust};
+use crate::math::{UvSets, V3, robust};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use simd::{Float, Lanes, Mask, Uint};
@@ -253,16 +253,22 @@ impl LightTable {
         // Off the light's surface, on the side that is seen.
         let side = L::F::one().or_else(front, -L::F::one());
         let end = robust::offset_point(point, ng.scale(side), normal[3]);
-        let (mut uv0, mut uv1) = (L::F::zero(), L::F::zero());
+        let mut uvs = UvSets::single(L::F::zero(), L::F::zero());
+        let mut vertex_opacity = L::F::one();
         if triangles.has_attributes() {
             let attributes = (at + L::U::splat(5)).records(&self.records)[0].to_bits();
             if (!attributes.eq(L::U::splat(NONE))).any() {
                 let a = triangles.attributes::<L>(attributes, b1, b2);
-                (uv0, uv1) = (a.u, a.v);
+                (uvs, vertex_opacity) = (a.uvs, a.opacity);
             }
         }
         let finite = pdf.is_finite() & pdf.gt(L::F::zero());
-        let radiance = materials.emission(textures, record[3][3].to_bits(), front, uv0, uv1, finite);
+        let material = record[3][3].to_bits();
+        let mut radiance: V3<L> = materials.emission(textures, material, front, &uvs, finite);
+        if materials.has_alpha() {
+            // The ray ends before the light's own surface, so what of it is not there is taken off here.
+            radiance = radiance.scale(materials.coverage(textures, material, &uvs, vertex_opacity, finite));
+        }
         LightSample {
             radiance,
             wi,

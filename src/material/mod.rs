@@ -3,29 +3,63 @@
 pub mod bsdf;
 pub mod table;
 
-use crate::texture::Param;
+use crate::texture::{Param, TextureRef};
 
-/// Metallic-roughness parameters with `KHR_materials_specular` and `KHR_materials_emissive_strength`.
+/// What is seen through a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AlphaMode {
+    /// Nothing: opacity is ignored.
+    Opaque,
+    /// All of it where the opacity is below `cutoff`, else nothing.
+    Mask {
+        /// >= 0; above 1 the surface is not there at all.
+        cutoff: f32,
+    },
+    /// A share of 1 - opacity, decided at random for each ray (coverage, not absorption).
+    Blend,
+}
+
+/// Metallic-roughness parameters with `KHR_materials_specular`, `KHR_materials_ior`, `KHR_materials_unlit` and
+/// `KHR_materials_emissive_strength`.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// For messages.
     pub name: String,
     /// Linear Rec.709 in [0, 1]; texture RGB in sRGB.
     pub base_color: Param<[f32; 3]>,
-    /// In [0, 1]; texture channel B, linear. The texture is the same one as roughness'.
+    /// In [0, 1]; texture channel A, linear; ignored where `alpha_mode` is opaque. In glTF the texture is the base colour's.
+    pub opacity: Param<f32>,
+    /// What `opacity` means.
+    pub alpha_mode: AlphaMode,
+    /// In [0, 1]; texture channel B, linear. In glTF the texture is the same one as roughness'.
     pub metallic: Param<f32>,
     /// Perceptual, in [0, 1]; texture channel G, linear.
     pub roughness: Param<f32>,
     /// Scale of the normal map's x and y; the texture is the tangent-space normal map.
     pub normal: Param<f32>,
+    /// Height map instead of a normal map: the height in metres (object space) of a texel of 1; texture channel R, linear.
+    pub bump: Param<f32>,
     /// Radiance in nits: `emissiveFactor x emissiveStrength`; texture RGB in sRGB.
     pub emission: Param<[f32; 3]>,
     /// `specularFactor` in [0, 1]; texture channel A, linear.
     pub specular: Param<f32>,
     /// `specularColorFactor` >= 0; texture RGB in sRGB.
     pub specular_color: Param<[f32; 3]>,
+    /// Index of refraction, >= 1, or 0: fully reflecting (`KHR_materials_ior`).
+    pub ior: f32,
+    /// Shows its base colour as it is to camera and mirror rays, neither lit nor lighting anything.
+    pub unlit: bool,
     /// Both sides emit. (Both sides are always seen; single-sided surfaces emit on their front only.)
     pub double_sided: bool,
+}
+
+impl Material {
+    /// Every texture that it reads.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        let colors = [self.base_color.texture, self.emission.texture, self.specular_color.texture];
+        let scalars = [self.opacity.texture, self.metallic.texture, self.roughness.texture, self.normal.texture];
+        colors.into_iter().chain(scalars).chain([self.bump.texture, self.specular.texture]).flatten()
+    }
 }
 
 impl Default for Material {
@@ -34,12 +68,17 @@ impl Default for Material {
         Self {
             name: String::from("default"),
             base_color: Param::constant([1.0; 3]),
+            opacity: Param::constant(1.0),
+            alpha_mode: AlphaMode::Opaque,
             metallic: Param::constant(1.0),
             roughness: Param::constant(1.0),
             normal: Param::constant(1.0),
+            bump: Param::constant(0.0),
             emission: Param::constant([0.0; 3]),
             specular: Param::constant(1.0),
             specular_color: Param::constant([1.0; 3]),
+            ior: 1.5,
+            unlit: false,
             double_sided: false,
         }
     }

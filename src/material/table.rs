@@ -1,66 +1,96 @@
 //! Materials as shading reads them, and their textures applied.
 
-use super::Material;
 use super::bsdf::Surface;
-use crate::id::TextureId;
-use crate::math::V3;
+use super::{AlphaMode, Material};
+use crate::math::{UvSets, V3};
 use crate::texture::lookup::{Encoding, NO_TEXTURE, TextureTable};
 use simd::{Float, Lanes, Mask, Uint};
 
-const RECORDS: u32 = 6;
+const RECORDS: u32 = 7;
 const DOUBLE_SIDED: u32 = 1;
 const EMISSIVE: u32 = 2;
+const MASK: u32 = 4;
+const BLEND: u32 = 8;
+const UNLIT: u32 = 16;
+/// The metallic texture is the roughness texture, as always in glTF.
+const METALLIC_WITH_ROUGHNESS: u32 = 32;
 
-/// Six 16-byte records a material.
+/// Seven 16-byte records a material.
 ///
 /// | record | x | y | z | w |
 /// |---|---|---|---|---|
 /// | 0 | base r | g | b | flags |
 /// | 1 | metallic | roughness | specular | normal scale |
-/// | 2 | dielectric f0 r | g | b | - |
+/// | 2 | dielectric f0 r | g | b | opacity |
 /// | 3 | emission r | g | b | emission texture |
-/// | 4 | base texture | metallic-roughness | normal | specular |
-/// | 5 | specular colour texture | - | - | - |
+/// | 4 | base texture | roughness | normal | specular |
+/// | 5 | specular colour texture | metallic, if it is not roughness' | opacity | bump |
+/// | 6 | alpha cutoff | bump height | - | - |
+///
+/// Textures are bindings of the scene's [`TextureTable`].
 #[derive(Clone, Debug, Default)]
 pub struct MaterialTable {
     records: Vec<[f32; 4]>,
-    /// Some material has a texture other than normal or emission.
+    /// Some material has a texture other than normal, bump, opacity or emission.
     is_textured: bool,
     /// Some material emits.
     is_emissive: bool,
+    /// Some material is seen through.
+    has_alpha: bool,
+    /// Some material is unlit.
+    has_unlit: bool,
 }
 
 impl MaterialTable {
-    /// All materials of a scene, in order; a scene without any gets the default one.
-    pub fn new(materials: &[Material]) -> Self {
+    /// All materials of a scene, in order, their textures bound in `textures`; a scene without any gets the default one.
+    pub fn new(materials: &[Material], textures: &mut TextureTable) -> Self {
         let mut table = Self::default();
         for m in materials {
-            table.push(m);
+            table.push(m, textures);
         }
         if materials.is_empty() {
-            table.push(&Material::default());
+            table.push(&Material::default(), textures);
         }
         table
     }
 
-    fn push(&mut self, m: &Material) {
-        let id = |t: Option<TextureId>| f32::from_bits(t.map_or(NO_TEXTURE, |t| t.0));
-        let emits = m.emission.factor.iter().any(|&e| e > 0.0);
-        let flags = if m.double_sided { DOUBLE_SIDED } else { 0 } | if emits { EMISSIVE } else { 0 };
+    fn push(&mut self, m: &Material, textures: &mut TextureTable) {
+        let mut id = |t| f32::from_bits(textures.bind(t));
+        let emits = !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0);
+        let (alpha, cutoff) = match m.alpha_mode {
+            AlphaMode::Opaque => (0, 0.0),
+            AlphaMode::Mask { cutoff } => (MASK, cutoff),
+            AlphaMode::Blend => (BLEND, 0.0),
+        };
+        let shares = m.metallic.texture.is_some() && m.metallic.texture == m.roughness.texture;
+        let flags =
+            [(m.double_sided, DOUBLE_SIDED), (emits, EMISSIVE), (m.unlit, UNLIT), (shares, METALLIC_WITH_ROUGHNESS)];
+        let flags = flags.iter().filter(|f| f.0).fold(alpha, |bits, f| bits | f.1);
         let ([r, g, b], [er, eg, eb]) = (m.base_color.factor, m.emission.factor);
-        // 0.04 = ((1.5 - 1) / (1.5 + 1))^2: glTF's dielectric.
-        let f0 = m.specular_color.factor.map(|c| 0.04 * c);
+        // KHR_materials_ior: ior 0 stands for infinite, which reflects everything.
+        let reflectance = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
+        let f0 = m.specular_color.factor.map(|c| reflectance * c);
+        let metallic = if shares { None } else { m.metallic.texture };
         self.records.extend([
             [r, g, b, f32::from_bits(flags)],
             [m.metallic.factor, m.roughness.factor, m.specular.factor, m.normal.factor],
-            [f0[0], f0[1], f0[2], 0.0],
+            [f0[0], f0[1], f0[2], m.opacity.factor],
             [er, eg, eb, id(m.emission.texture)],
             [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
-            [id(m.specular_color.texture), 0.0, 0.0, 0.0],
+            [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(m.bump.texture)],
+            [cutoff, m.bump.factor, 0.0, 0.0],
         ]);
-        let textures = [m.base_color.texture, m.roughness.texture, m.specular.texture, m.specular_color.texture];
+        let textures = [
+            m.base_color.texture,
+            m.roughness.texture,
+            m.metallic.texture,
+            m.specular.texture,
+            m.specular_color.texture,
+        ];
         self.is_textured |= textures.iter().any(Option::is_some);
         self.is_emissive |= emits;
+        self.has_alpha |= alpha != 0;
+        self.has_unlit |= m.unlit;
     }
 
     /// Whether anything emits at all.
@@ -73,20 +103,64 @@ impl MaterialTable {
         self.is_textured
     }
 
+    /// Whether anything is seen through.
+    pub fn has_alpha(&self) -> bool {
+        self.has_alpha
+    }
+
+    /// Whether anything is unlit.
+    pub fn has_unlit(&self) -> bool {
+        self.has_unlit
+    }
+
+    /// The lanes whose material is unlit.
+    #[inline(always)]
+    pub fn unlit<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
+        active & self.record::<L>(material, 0)[3].to_bits().has(UNLIT)
+    }
+
+    /// Share of a surface that is there, in [0, 1]: 1 if opaque, 0 or 1 under a mask, else the opacity. `vertex` is the
+    /// vertex colour's part of it.
+    #[inline(always)]
+    pub fn coverage<L: Lanes>(
+        &self,
+        textures: &TextureTable,
+        material: L::U,
+        uvs: &UvSets<L>,
+        vertex: L::F,
+        active: L::M,
+    ) -> L::F {
+        let (zero, one) = (L::F::zero(), L::F::one());
+        let flags = self.record::<L>(material, 0)[3].to_bits();
+        let masks = active & flags.has(MASK);
+        let blends = active & flags.has(BLEND);
+        if !(masks | blends).any() {
+            return one;
+        }
+        let mut opacity = self.record::<L>(material, 2)[3] * vertex;
+        let texture = self.record::<L>(material, 5)[2].to_bits();
+        let has = (masks | blends) & !texture.eq(L::U::splat(NO_TEXTURE));
+        if has.any() {
+            opacity = (opacity * textures.lookup::<L>(texture, uvs, Encoding::Linear).a).or_else(has, opacity);
+        }
+        let cutoff = self.record::<L>(material, 6)[0];
+        let there = one.or_else(opacity.ge(cutoff), zero);
+        there.or_else(masks, opacity.max(zero).min(one).or_else(blends, one))
+    }
+
     #[inline(always)]
     fn record<L: Lanes>(&self, material: L::U, k: u32) -> [L::F; 4] {
         (material * L::U::splat(RECORDS) + L::U::splat(k)).records(&self.records)
     }
 
-    /// Emitted radiance, nits, towards the front (`front`) or the back of the surface at texture coordinate (`u`, `v`).
+    /// Emitted radiance, nits, towards the front (`front`) or the back of the surface at texture coordinates `uvs`.
     #[inline(always)]
     pub fn emission<L: Lanes>(
         &self,
         textures: &TextureTable,
         material: L::U,
         front: L::M,
-        u: L::F,
-        v: L::F,
+        uvs: &UvSets<L>,
         active: L::M,
     ) -> V3<L> {
         let flags = self.record::<L>(material, 0)[3].to_bits();
@@ -101,18 +175,17 @@ impl MaterialTable {
         if !textured.any() {
             return factor;
         }
-        let texel = textures.lookup::<L>(texture, u, v, Encoding::Srgb);
+        let texel = textures.lookup::<L>(texture, uvs, Encoding::Srgb);
         (factor * texel.rgb).or_else(textured, factor)
     }
 
-    /// Reflection parameters at texture coordinate (`u`, `v`).
+    /// Reflection parameters at texture coordinates `uvs`.
     #[inline(always)]
     pub fn surface<L: Lanes>(
         &self,
         textures: &TextureTable,
         material: L::U,
-        u: L::F,
-        v: L::F,
+        uvs: &UvSets<L>,
         active: L::M,
     ) -> Surface<L> {
         let [r, g, b, _] = self.record::<L>(material, 0);
@@ -123,26 +196,34 @@ impl MaterialTable {
         if self.is_textured {
             let none = L::U::splat(NO_TEXTURE);
             let [base, rough, _, spec] = self.record::<L>(material, 4);
-            let (base, rough, spec) = (base.to_bits(), rough.to_bits(), spec.to_bits());
+            let [color, metal, _, _] = self.record::<L>(material, 5);
+            let (base, rough, spec, metal) = (base.to_bits(), rough.to_bits(), spec.to_bits(), metal.to_bits());
+            let shared = self.record::<L>(material, 0)[3].to_bits().has(METALLIC_WITH_ROUGHNESS);
             let has = active & !base.eq(none);
             if has.any() {
-                s.base = (s.base * textures.lookup::<L>(base, u, v, Encoding::Srgb).rgb).or_else(has, s.base);
+                s.base = (s.base * textures.lookup::<L>(base, uvs, Encoding::Srgb).rgb).or_else(has, s.base);
             }
             let has = active & !rough.eq(none);
             if has.any() {
-                let t = textures.lookup::<L>(rough, u, v, Encoding::Linear);
+                let t = textures.lookup::<L>(rough, uvs, Encoding::Linear);
                 s.roughness = (s.roughness * t.rgb.y).or_else(has, s.roughness);
+                // Where the metallic texture is the same one, this was its lookup too; see `push`.
+                s.metallic = (s.metallic * t.rgb.z).or_else(has & shared, s.metallic);
+            }
+            let has = active & !metal.eq(none);
+            if has.any() {
+                let t = textures.lookup::<L>(metal, uvs, Encoding::Linear);
                 s.metallic = (s.metallic * t.rgb.z).or_else(has, s.metallic);
             }
             let has = active & !spec.eq(none);
             if has.any() {
-                let t = textures.lookup::<L>(spec, u, v, Encoding::Linear);
+                let t = textures.lookup::<L>(spec, uvs, Encoding::Linear);
                 s.specular = (s.specular * t.a).or_else(has, s.specular);
             }
-            let color = self.record::<L>(material, 5)[0].to_bits();
+            let color = color.to_bits();
             let has = active & !color.eq(none);
             if has.any() {
-                s.f0 = (s.f0 * textures.lookup::<L>(color, u, v, Encoding::Srgb).rgb).or_else(has, s.f0);
+                s.f0 = (s.f0 * textures.lookup::<L>(color, uvs, Encoding::Srgb).rgb).or_else(has, s.f0);
             }
         }
         s.f0 = s.f0.min(V3::splat([1.0; 3]));
@@ -155,8 +236,7 @@ impl MaterialTable {
         &self,
         textures: &TextureTable,
         material: L::U,
-        u: L::F,
-        v: L::F,
+        uvs: &UvSets<L>,
         active: L::M,
     ) -> (V3<L>, L::M) {
         let texture = self.record::<L>(material, 4)[2].to_bits();
@@ -166,7 +246,7 @@ impl MaterialTable {
             return (flat, has);
         }
         let scale = self.record::<L>(material, 1)[3];
-        let t = textures.lookup::<L>(texture, u, v, Encoding::Linear).rgb;
+        let t = textures.lookup::<L>(texture, uvs, Encoding::Linear).rgb;
         let (two, one) = (L::F::splat(2.0), L::F::one());
         let n = V3::<L>::new((t.x * two - one) * scale, (t.y * two - one) * scale, t.z * two - one);
         (n.or_else(has, flat), has)

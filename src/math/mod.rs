@@ -3,6 +3,8 @@
 mod frame;
 pub mod lanes;
 pub mod robust;
+mod uv;
 
 pub use frame::Frame;
 pub use lanes::V3;
+pub use uv::{MAX_UV_SETS, UvSets};

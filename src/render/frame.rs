@@ -116,10 +116,9 @@ fn render_here(
         lanes: level.lanes(),
         warnings,
     };
-    let Projection::Perspective { yfov, .. } = camera.projection;
     let frame_camera = FrameCamera {
         world_from_camera: camera.world_from_camera,
-        yfov,
+        projection: camera.projection,
         aspect_ratio: f64::from(width) / f64::from(height),
     };
     Ok(Frame { width, height, window, pixels, spp: settings.spp, camera: frame_camera, stats })

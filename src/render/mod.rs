@@ -29,8 +29,8 @@ pub struct Progress {
 pub struct FrameCamera {
     /// Rigid, right-handed, camera looking along -Z; world space of the file.
     pub world_from_camera: glam::DMat4,
-    /// Vertical field of view in radians.
-    pub yfov: f64,
+    /// How points became pixels; of its two sizes the vertical one was kept.
+    pub projection: crate::camera::Projection,
     /// Width over height of the whole picture.
     pub aspect_ratio: f64,
 }

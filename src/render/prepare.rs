@@ -10,7 +10,7 @@ use crate::light::table::{LightTable, PreparedLight};
 use crate::material::table::MaterialTable;
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
-use crate::shape::table::{NONE, TriangleTable};
+use crate::shape::table::{Corners, NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use glam::{DMat3, DVec3};
 
@@ -49,8 +49,8 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     }
     let bounds = bounds(scene);
     let origin = bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
-    let textures = TextureTable::new(&scene.textures, &scene.images)?;
-    let materials = MaterialTable::new(&scene.materials);
+    let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
+    let materials = MaterialTable::new(&scene.materials, &mut textures);
     let mut triangles = TriangleTable::with_capacity(count);
     let mut geometry = Triangles::default();
     let mut lights = Vec::new();
@@ -114,7 +114,7 @@ fn flatten(
         (p - origin).as_vec3().to_array()
     }));
     let average = material.map_or(0.0, |m| mean_emission(scene, m));
-    let needs_attributes = mesh.normals.is_some() || mesh.uvs.is_some();
+    let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
         let [j, k] = if mirrors { [k, j] } else { [j, k] };
         let corner = |v: u32| glam::Vec3::from(geometry.positions[(first + v) as usize]);
@@ -149,7 +149,7 @@ fn flatten(
     }
 }
 
-/// Normals and texture coordinates of a triangle's corners.
+/// Attributes of a triangle's corners.
 fn push_attributes(mesh: &Mesh, corners: [u32; 3], normal_from_object: DMat3, table: &mut TriangleTable) -> u32 {
     let normals = mesh.normals.as_ref().map(|n| {
         corners.map(|v| {
@@ -157,8 +157,9 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normal_from_object: DMat3, ta
             (normal_from_object * n).normalize_or_zero().as_vec3()
         })
     });
-    let uvs = corners.map(|v| mesh.uvs.as_ref().map_or([0.0; 2], |uv| uv[v as usize]));
-    table.push_attributes(normals, uvs)
+    let uvs = mesh.uv_sets.iter().map(|set| corners.map(|v| set[v as usize])).collect();
+    let colors = mesh.colors.as_ref().map(|c| corners.map(|v| c[v as usize]));
+    table.push_attributes(&Corners { normals, uvs, colors })
 }
 
 /// Matrix of cofactors: the inverse transpose times the determinant.
@@ -169,16 +170,19 @@ fn cofactor(m: DMat3) -> DMat3 {
 /// Mean over channels and texture of a material's emission, nits: what its share of the light samples follows. Positive
 /// wherever it emits at all.
 fn mean_emission(scene: &Scene, material: &crate::material::Material) -> f64 {
+    if material.unlit {
+        return 0.0;
+    }
     let factor = material.emission.factor.map(f64::from);
     let Some(texture) = material.emission.texture else {
         return factor.iter().sum::<f64>() / 3.0;
     };
-    let image = &scene.images[scene.textures[texture.index()].image.index()];
+    let image = &scene.images[scene.textures[texture.texture.index()].image.index()];
     let mut sums = [0.0; 3];
-    for texel in &image.texels {
-        for (sum, &byte) in sums.iter_mut().zip(texel) {
+    for i in 0..image.texels.len() {
+        for (sum, value) in sums.iter_mut().zip(image.texels.get(i)) {
             // The square is near enough to the sRGB curve for a sampling weight.
-            *sum += (f64::from(byte) / 255.0).powi(2);
+            *sum += f64::from(value).powi(2);
         }
     }
     let n = image.texels.len().max(1) as f64;

@@ -1,6 +1,7 @@
 //! What every scene must satisfy before it is prepared.
 
 use super::Scene;
+use crate::math::MAX_UV_SETS;
 use crate::shape::Mesh;
 use glam::DVec3;
 
@@ -40,15 +41,16 @@ fn check_ids(scene: &Scene) {
         scene.materials.get(mesh.material.index()).expect("a mesh's material was added to the builder");
         let n = mesh.positions.len();
         assert!(mesh.normals.as_ref().is_none_or(|a| a.len() == n), "one normal per vertex");
-        assert!(mesh.uvs.as_ref().is_none_or(|a| a.len() == n), "one texture coordinate per vertex");
+        assert!(mesh.uv_sets.iter().all(|a| a.len() == n), "one texture coordinate per vertex");
+        assert!(mesh.uv_sets.len() <= MAX_UV_SETS, "few sets of texture coordinates");
+        assert!(mesh.colors.as_ref().is_none_or(|a| a.len() == n), "one colour per vertex");
         assert!(mesh.tangents.as_ref().is_none_or(|a| a.len() == n), "one tangent per vertex");
         assert!(mesh.indices.as_flattened().iter().all(|&i| (i as usize) < n), "vertex indices are in range");
     }
     for m in &scene.materials {
-        let colors = [m.base_color.texture, m.emission.texture, m.specular_color.texture];
-        let scalars = [m.metallic.texture, m.roughness.texture, m.normal.texture, m.specular.texture];
-        for id in colors.into_iter().chain(scalars).flatten() {
-            scene.textures.get(id.index()).expect("a material's texture was added to the builder");
+        for read in m.textures() {
+            scene.textures.get(read.texture.index()).expect("a material's texture was added to the builder");
+            assert!((read.uv_set as usize) < MAX_UV_SETS, "few sets of texture coordinates");
         }
     }
     for texture in &scene.textures {
@@ -91,7 +93,7 @@ fn is_flat(corners: [[f32; 3]; 3]) -> bool {
 /// How many texture coordinates were not finite; they become 0.
 fn clean_uvs(mesh: &mut Mesh) -> usize {
     let bad = |uv: &&mut [f32; 2]| !uv.iter().all(|c| c.is_finite());
-    mesh.uvs.iter_mut().flatten().filter(bad).map(|uv| *uv = [0.0; 2]).count()
+    mesh.uv_sets.iter_mut().flatten().filter(bad).map(|uv| *uv = [0.0; 2]).count()
 }
 
 /// A count over meshes, with the names of the first few.
@@ -132,7 +134,8 @@ mod tests {
         let mesh = Mesh {
             positions,
             normals: None,
-            uvs: None,
+            uv_sets: Vec::new(),
+            colors: None,
             tangents: None,
             indices,
             material: MaterialId(0),
@@ -168,9 +171,9 @@ mod tests {
     #[test]
     fn non_finite_uvs_become_zero() {
         let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
-        scene.meshes[0].uvs = Some(vec![[0.5, f32::NAN], [1.0, 2.0], [f32::INFINITY, 0.0]]);
+        scene.meshes[0].uv_sets = vec![vec![[0.5, f32::NAN], [1.0, 2.0], [f32::INFINITY, 0.0]]];
         check(&mut scene);
-        assert_eq!(scene.meshes[0].uvs.as_deref(), Some(&[[0.0, 0.0], [1.0, 2.0], [0.0, 0.0]][..]));
+        assert_eq!(scene.meshes[0].uv_sets, [[[0.0, 0.0], [1.0, 2.0], [0.0, 0.0]]]);
         assert!(scene.warnings[0].starts_with("2 texture coordinates"), "{:?}", scene.warnings);
     }
 

@@ -11,8 +11,11 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// `[n][3]` shading normals, object space, any length; `None` = flat shading.
     pub normals: Option<Vec<[f32; 3]>>,
-    /// `[n][2]` texture coordinates of set 0, v = 0 at the top.
-    pub uvs: Option<Vec<[f32; 2]>>,
+    /// Sets of `[n][2]` texture coordinates, v = 0 at the top: those that the material's textures name, in the order of
+    /// their [`crate::texture::TextureRef::uv_set`]; at most [`crate::math::MAX_UV_SETS`]. A set that is missing reads as 0.
+    pub uv_sets: Vec<Vec<[f32; 2]>>,
+    /// `[n][4]` vertex colours, linear R G B and opacity; they multiply the base colour.
+    pub colors: Option<Vec<[f32; 4]>>,
     /// `[n][4]` tangents, w = handedness (+1 or -1); only where the material has a normal map.
     pub tangents: Option<Vec<[f32; 4]>>,
     /// `[m][3]` vertex indices, counter-clockwise seen from the front; all `< n`.

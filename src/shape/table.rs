@@ -1,10 +1,28 @@
 //! Triangles as shading reads them: four 16-byte records, one cache line, a triangle.
 
-use crate::math::{V3, robust};
-use simd::{Float, Lanes, Uint};
+use crate::math::{MAX_UV_SETS, UvSets, V3, robust};
+use simd::{Float, Lanes, Mask, Uint};
 
 /// Index of no attributes, in records.
 pub const NONE: u32 = u32::MAX;
+
+/// Flags of attributes: normals are given.
+const HAS_NORMALS: u32 = 1;
+/// Flags of attributes: vertex colours are given.
+const HAS_COLORS: u32 = 2;
+/// Where the number of sets of coordinates beyond the first is in the flags.
+const MORE_UV_SETS_SHIFT: u32 = 2;
+
+/// Attributes of a triangle's corners, as they are put into the table.
+#[derive(Clone, Debug, Default)]
+pub struct Corners {
+    /// Shading normals; without them shading is flat.
+    pub normals: Option<[glam::Vec3; 3]>,
+    /// Texture coordinates: sets of three, at most [`MAX_UV_SETS`].
+    pub uvs: Vec<[[f32; 2]; 3]>,
+    /// Linear R G B and opacity.
+    pub colors: Option<[[f32; 4]; 3]>,
+}
 
 /// What shading needs of every triangle of the prepared scene.
 ///
@@ -17,8 +35,13 @@ pub const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug, Default)]
 pub struct TriangleTable {
     records: Vec<[f32; 4]>,
-    /// Four a triangle that has any: normal 0, u0 | normal 1, v0 | normal 2, u1 | v1, u2, v2, 1 if normals are given.
+    /// Four or more a triangle that has any: normal 0, u0 | normal 1, v0 | normal 2, u1 | v1, u2, v2, flags; then, if
+    /// the flags say so, three vertex colours; then two for each further set of coordinates: u0, v0, u1, v1 | u2, v2.
     attributes: Vec<[f32; 4]>,
+    /// Most sets of coordinates of any triangle, at least 1.
+    uv_sets: usize,
+    /// Some triangle has vertex colours.
+    has_colors: bool,
     /// Three a triangle with a normal map: tangent and handedness of each corner.
     tangents: Vec<[f32; 4]>,
 }
@@ -51,10 +74,12 @@ pub struct Attributes<L: Lanes> {
     pub normal: V3<L>,
     /// Whether the mesh gives normals.
     pub has_normal: L::M,
-    /// Texture coordinate.
-    pub u: L::F,
-    /// Texture coordinate, 0 at the top.
-    pub v: L::F,
+    /// Texture coordinates, v = 0 at the top.
+    pub uvs: UvSets<L>,
+    /// Vertex colour, linear; white where there is none.
+    pub color: V3<L>,
+    /// Opacity of the vertex colour; 1 where there is none.
+    pub opacity: L::F,
 }
 
 impl TriangleTable {
@@ -72,15 +97,28 @@ impl TriangleTable {
         self.records.push(record(ng, 0));
     }
 
-    /// Adds corner attributes and gives their index. Without `normals` shading is flat.
-    pub fn push_attributes(&mut self, normals: Option<[glam::Vec3; 3]>, uvs: [[f32; 2]; 3]) -> u32 {
-        let index = (self.attributes.len() / 4) as u32;
-        let flag = if normals.is_some() { 1.0 } else { 0.0 };
+    /// Adds corner attributes and gives their index.
+    pub fn push_attributes(&mut self, corners: &Corners) -> u32 {
+        let Corners { normals, uvs, colors } = corners;
+        let index = self.attributes.len() as u32;
+        let more = uvs.len().saturating_sub(1);
+        assert!(more < MAX_UV_SETS, "at most {MAX_UV_SETS} sets of coordinates");
+        let flags = if normals.is_some() { HAS_NORMALS } else { 0 }
+            | if colors.is_some() { HAS_COLORS } else { 0 }
+            | (more as u32) << MORE_UV_SETS_SHIFT;
         let n = normals.unwrap_or_default();
-        self.attributes.push([n[0].x, n[0].y, n[0].z, uvs[0][0]]);
-        self.attributes.push([n[1].x, n[1].y, n[1].z, uvs[0][1]]);
-        self.attributes.push([n[2].x, n[2].y, n[2].z, uvs[1][0]]);
-        self.attributes.push([uvs[1][1], uvs[2][0], uvs[2][1], flag]);
+        let uv = uvs.first().copied().unwrap_or_default();
+        self.attributes.push([n[0].x, n[0].y, n[0].z, uv[0][0]]);
+        self.attributes.push([n[1].x, n[1].y, n[1].z, uv[0][1]]);
+        self.attributes.push([n[2].x, n[2].y, n[2].z, uv[1][0]]);
+        self.attributes.push([uv[1][1], uv[2][0], uv[2][1], f32::from_bits(flags)]);
+        self.attributes.extend(colors.iter().flatten());
+        for [a, b, c] in uvs.iter().skip(1) {
+            self.attributes.push([a[0], a[1], b[0], b[1]]);
+            self.attributes.push([c[0], c[1], 0.0, 0.0]);
+        }
+        self.has_colors |= colors.is_some();
+        self.uv_sets = self.uv_sets.max(1 + more);
         index
     }
 
@@ -108,6 +146,11 @@ impl TriangleTable {
     /// Any triangle with normals or texture coordinates.
     pub fn has_attributes(&self) -> bool {
         !self.attributes.is_empty()
+    }
+
+    /// Any triangle with vertex colours.
+    pub fn has_colors(&self) -> bool {
+        self.has_colors
     }
 
     /// Any triangle with tangents.
@@ -139,21 +182,62 @@ impl TriangleTable {
     /// Attributes `index` at barycentric (`u`, `v`); the table must have some.
     #[inline(always)]
     pub fn attributes<L: Lanes>(&self, index: L::U, u: L::F, v: L::F) -> Attributes<L> {
-        let at = index.shl(2);
+        let at = index;
         let one = L::U::splat(1);
         let a0 = at.records(&self.attributes);
         let a1 = (at + one).records(&self.attributes);
         let a2 = (at + one + one).records(&self.attributes);
         let a3 = (at + one + one + one).records(&self.attributes);
+        let flags = a3[3].to_bits();
         let n0 = V3::<L>::new(a0[0], a0[1], a0[2]);
         let n1 = V3::<L>::new(a1[0], a1[1], a1[2]);
         let n2 = V3::<L>::new(a2[0], a2[1], a2[2]);
-        // a0 + (a1 - a0) b1 + (a2 - a0) b2: exactly the constant where the corners agree (numerics GEO-08).
-        Attributes {
-            normal: (n2 - n0).mul_add(v, (n1 - n0).mul_add(u, n0)),
-            has_normal: a3[3].gt(L::F::zero()),
-            u: (a3[1] - a0[3]).mul_add(v, (a2[3] - a0[3]).mul_add(u, a0[3])),
-            v: (a3[2] - a1[3]).mul_add(v, (a3[0] - a1[3]).mul_add(u, a1[3])),
+        let mut attributes = Attributes {
+            normal: interpolate3(n0, n1, n2, u, v),
+            has_normal: flags.has(HAS_NORMALS),
+            uvs: UvSets::single(
+                interpolate::<L>(a0[3], a2[3], a3[1], u, v),
+                interpolate::<L>(a1[3], a3[0], a3[2], u, v),
+            ),
+            color: V3::splat([1.0; 3]),
+            opacity: L::F::one(),
+        };
+        if self.has_colors || self.uv_sets > 1 {
+            self.more::<L>(at + L::U::splat(4), flags, u, v, &mut attributes);
+        }
+        attributes
+    }
+
+    /// What few triangles have: colours and further sets of coordinates, from record `at` on.
+    #[inline(always)]
+    fn more<L: Lanes>(&self, at: L::U, flags: L::U, u: L::F, v: L::F, into: &mut Attributes<L>) {
+        let (zero, one) = (L::U::splat(0), L::U::splat(1));
+        let colored = flags.has(HAS_COLORS);
+        if colored.any() {
+            let c0 = at.records(&self.attributes);
+            let c1 = (at + one).records(&self.attributes);
+            let c2 = (at + one + one).records(&self.attributes);
+            let rgb = interpolate3(
+                V3::<L>::new(c0[0], c0[1], c0[2]),
+                V3::<L>::new(c1[0], c1[1], c1[2]),
+                V3::<L>::new(c2[0], c2[1], c2[2]),
+                u,
+                v,
+            );
+            into.color = rgb.or_else(colored, into.color);
+            into.opacity = interpolate::<L>(c0[3], c1[3], c2[3], u, v).or_else(colored, into.opacity);
+        }
+        let mut at = at + L::U::splat(3).or_else(colored, zero);
+        let more = flags.shr(MORE_UV_SETS_SHIFT);
+        for k in 1..self.uv_sets.min(MAX_UV_SETS) {
+            // A lane without this set reads whatever lies there, and nobody asks for it.
+            let has = !more.lt(L::U::splat(k as u32));
+            let first = at.records(&self.attributes);
+            let second = (at + one).records(&self.attributes);
+            let su = interpolate::<L>(first[0], first[2], second[0], u, v).masked(has);
+            let sv = interpolate::<L>(first[1], first[3], second[1], u, v).masked(has);
+            into.uvs.set(k, su, sv);
+            at = at + one + one;
         }
     }
 
@@ -169,6 +253,17 @@ impl TriangleTable {
             (V3::<L>::new(t0[0], t0[1], t0[2]), V3::<L>::new(t1[0], t1[1], t1[2]), V3::<L>::new(t2[0], t2[1], t2[2]));
         ((c - a).mul_add(v, (b - a).mul_add(u, a)), t0[3])
     }
+}
+
+/// `a0 + (a1 - a0) b1 + (a2 - a0) b2`: exactly the constant where the corners agree (numerics GEO-08).
+#[inline(always)]
+fn interpolate<L: Lanes>(a0: L::F, a1: L::F, a2: L::F, b1: L::F, b2: L::F) -> L::F {
+    (a2 - a0).mul_add(b2, (a1 - a0).mul_add(b1, a0))
+}
+
+#[inline(always)]
+fn interpolate3<L: Lanes>(a0: V3<L>, a1: V3<L>, a2: V3<L>, b1: L::F, b2: L::F) -> V3<L> {
+    (a2 - a0).mul_add(b2, (a1 - a0).mul_add(b1, a0))
 }
 
 impl<L: Lanes> Triangle<L> {

@@ -2,18 +2,26 @@
 //!
 //! All texels of a scene lie in one array, so lanes with different textures are read together.
 
-use super::{Filter, Image, Texture, Wrap};
-use crate::math::{V3, lanes::lerp};
+use super::{Filter, Image, Texels, Texture, TextureRef, Wrap};
+use crate::math::{UvSets, V3, lanes::lerp};
 use simd::{Float, Lanes, Uint};
 
-/// Id of no texture, in tables.
+/// No texture, in tables.
 pub const NO_TEXTURE: u32 = u32::MAX;
 
-/// The textures of a scene, ready to be read.
+/// The textures of a scene, ready to be read: each as some material reads it, which is called a binding.
 #[derive(Clone, Debug, Default)]
 pub struct TextureTable {
-    /// Per texture: first texel, width, height (as integers' bits), flags.
+    /// Per texture of the scene: first texel, width, height (as integers' bits), flags.
+    textures: Vec<[f32; 4]>,
+    /// What each binding stands for.
+    bindings: Vec<TextureRef>,
+    /// Per binding: the texture's record with the set of coordinates in its flags.
     headers: Vec<[f32; 4]>,
+    /// Two per binding: the rows of its transform.
+    transforms: Vec<[f32; 4]>,
+    /// Some binding has a transform.
+    has_transforms: bool,
     /// R, G, B, A from the low byte up, rows from the top.
     texels: Vec<u32>,
 }
@@ -22,6 +30,8 @@ const WRAP_BITS: u32 = 2;
 const CLAMP: u32 = 1;
 const MIRROR: u32 = 2;
 const NEAREST: u32 = 1 << (2 * WRAP_BITS);
+/// Where the set of coordinates is in the flags.
+const UV_SET_SHIFT: u32 = 8;
 
 /// What the R, G, B bytes mean; A is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,14 +65,19 @@ impl TextureTable {
         let mut first = Vec::with_capacity(images.len());
         for image in images {
             first.push(texels.len() as u32);
-            texels.extend(image.texels.iter().map(|t| u32::from_le_bytes(*t)));
+            match &image.texels {
+                Texels::Rgba8(t) => texels.extend(t.iter().map(|t| u32::from_le_bytes(*t))),
+                Texels::Rgba16(t) => {
+                    texels.extend(t.iter().map(|t| u32::from_le_bytes(t.map(|c| (u32::from(c) / 257) as u8))));
+                }
+            }
         }
         let wrap = |w: Wrap| match w {
             Wrap::Repeat => 0,
             Wrap::ClampToEdge => CLAMP,
             Wrap::MirroredRepeat => MIRROR,
         };
-        let headers = textures
+        let textures = textures
             .iter()
             .map(|t| {
                 let image = &images[t.image.index()];
@@ -71,15 +86,38 @@ impl TextureTable {
                 [first[t.image.index()], image.width, image.height, flags].map(f32::from_bits)
             })
             .collect();
-        Ok(Self { headers, texels })
+        Ok(Self { textures, texels, ..Self::default() })
     }
 
-    /// The texture `id` at (`u`, `v`); a lane whose id is of no texture reads anything.
+    /// The binding of `wanted`, the same for the same; [`NO_TEXTURE`] for `None`.
+    pub fn bind(&mut self, wanted: Option<TextureRef>) -> u32 {
+        let Some(wanted) = wanted else { return NO_TEXTURE };
+        if let Some(known) = self.bindings.iter().position(|b| *b == wanted) {
+            return known as u32;
+        }
+        let [first, width, height, flags] = self.textures[wanted.texture.index()];
+        let flags = f32::from_bits(flags.to_bits() | wanted.uv_set << UV_SET_SHIFT);
+        self.bindings.push(wanted);
+        self.headers.push([first, width, height, flags]);
+        let m = wanted.transform.map_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], |t| t.m);
+        self.transforms.extend(m.map(|[a, b, c]| [a, b, c, 0.0]));
+        self.has_transforms |= wanted.transform.is_some();
+        (self.bindings.len() - 1) as u32
+    }
+
+    /// The binding `id` at the coordinates that it asks for; a lane whose id is [`NO_TEXTURE`] reads anything.
     #[inline(always)]
-    pub fn lookup<L: Lanes>(&self, id: L::U, u: L::F, v: L::F, encoding: Encoding) -> Texel<L> {
+    pub fn lookup<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {
         let [first, width, height, flags] = id.records(&self.headers);
         let (first, flags) = (first.to_bits(), flags.to_bits());
         let (width, height) = (width.to_bits(), height.to_bits());
+        let [mut u, mut v] = uvs.get(flags.shr(UV_SET_SHIFT));
+        if self.has_transforms {
+            let row = id.min(L::U::splat(self.headers.len() as u32 - 1)).shl(1);
+            let [a, b, c, _] = row.records(&self.transforms);
+            let [d, e, f, _] = (row + L::U::splat(1)).records(&self.transforms);
+            (u, v) = (a.mul_add(u, b.mul_add(v, c)), d.mul_add(u, e.mul_add(v, f)));
+        }
         let across = taps::<L>(u, width.to_float(), flags);
         let down = taps::<L>(v, height.to_float(), flags.shr(WRAP_BITS));
         let row0 = first + down.first * width;
@@ -161,7 +199,7 @@ pub fn srgb_to_linear<F: Float>(v: F) -> F {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::id::ImageId;
+    use crate::id::{ImageId, TextureId};
     use simd::{Kernel, Level, dispatch};
 
     struct Read<'a> {
@@ -176,7 +214,8 @@ mod tests {
 
         #[inline(always)]
         fn run<L: Lanes>(self) -> [f32; 4] {
-            let t = self.table.lookup::<L>(L::U::splat(0), L::F::splat(self.u), L::F::splat(self.v), self.encoding);
+            let uvs = UvSets::<L>::single(L::F::splat(self.u), L::F::splat(self.v));
+            let t = self.table.lookup::<L>(L::U::splat(0), &uvs, self.encoding);
             let mut out = [[0.0; 16]; 4];
             for (o, c) in out.iter_mut().zip([t.rgb.x, t.rgb.y, t.rgb.z, t.a]) {
                 c.store(o, 0);
@@ -188,8 +227,15 @@ mod tests {
     fn table(wrap: Wrap, filter: Filter) -> TextureTable {
         // 3 x 2 texels: red counts across, green counts down.
         let texels = (0..6u8).map(|i| [i % 3 * 100, i / 3 * 200, 7, 255]).collect();
-        let image = Image { width: 3, height: 2, texels, name: String::new() };
-        TextureTable::new(&[Texture { image: ImageId(0), wrap_u: wrap, wrap_v: wrap, filter }], &[image]).unwrap()
+        let image = Image { width: 3, height: 2, texels: Texels::Rgba8(texels), name: String::new() };
+        bound(
+            TextureTable::new(&[Texture { image: ImageId(0), wrap_u: wrap, wrap_v: wrap, filter }], &[image]).unwrap(),
+        )
+    }
+
+    fn bound(mut table: TextureTable) -> TextureTable {
+        table.bind(Some(TextureRef::plain(TextureId(0))));
+        table
     }
 
     fn read(t: &TextureTable, u: f32, v: f32) -> [f32; 4] {
@@ -255,10 +301,10 @@ mod tests {
     #[test]
     fn srgb_bytes_decode_within_the_stated_error() {
         for byte in 0..=255u8 {
-            let image = Image { width: 1, height: 1, texels: vec![[byte, byte, byte, byte]], name: String::new() };
+            let image = Image { width: 1, height: 1, texels: Texels::Rgba8(vec![[byte; 4]]), name: String::new() };
             let sampler =
                 Texture { image: ImageId(0), wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, filter: Filter::Bilinear };
-            let table = TextureTable::new(&[sampler], &[image]).unwrap();
+            let table = bound(TextureTable::new(&[sampler], &[image]).unwrap());
             let got = dispatch(Level::best(), Read { table: &table, u: 0.5, v: 0.5, encoding: Encoding::Srgb });
             let v = f64::from(byte) / 255.0;
             let exact = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };

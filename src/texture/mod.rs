@@ -4,17 +4,49 @@ pub mod lookup;
 
 use crate::id::{ImageId, TextureId};
 
-/// Decoded pixels, 8 bits a channel, as encoded in the file (sRGB or linear is decided by the use, not here).
+/// Decoded pixels, as encoded in the file (sRGB or linear is decided by the use, not here).
 #[derive(Clone, Debug)]
 pub struct Image {
     /// Pixels across.
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// `[height * width]`, row 0 at the top, R G B A.
-    pub texels: Vec<[u8; 4]>,
+    /// `[height * width]`, row 0 at the top.
+    pub texels: Texels,
     /// For messages: the image's name or JSON pointer.
     pub name: String,
+}
+
+/// R G B A of each pixel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Texels {
+    /// 8 bits a channel.
+    Rgba8(Vec<[u8; 4]>),
+    /// 16 bits a channel.
+    Rgba16(Vec<[u16; 4]>),
+}
+
+impl Texels {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Rgba8(texels) => texels.len(),
+            Self::Rgba16(texels) => texels.len(),
+        }
+    }
+
+    /// None at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Texel `i` as encoded, each channel in [0, 1].
+    pub fn get(&self, i: usize) -> [f32; 4] {
+        match self {
+            Self::Rgba8(texels) => texels[i].map(|c| f32::from(c) / 255.0),
+            Self::Rgba16(texels) => texels[i].map(|c| f32::from(c) / 65535.0),
+        }
+    }
 }
 
 /// What happens outside [0, 1].
@@ -50,13 +82,38 @@ pub struct Texture {
     pub filter: Filter,
 }
 
+/// How a material reads a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// What is read.
+    pub texture: TextureId,
+    /// Where: index into [`crate::shape::Mesh::uv_sets`], less than [`crate::math::MAX_UV_SETS`].
+    pub uv_set: u32,
+    /// Applied to the mesh's coordinates first (`KHR_texture_transform`); `None` = as they are.
+    pub transform: Option<UvTransform>,
+}
+
+impl TextureRef {
+    /// The texture at the first set of coordinates as they are.
+    pub fn plain(texture: TextureId) -> Self {
+        Self { texture, uv_set: 0, transform: None }
+    }
+}
+
+/// An affine map of texture coordinates: `u' = m[0][0] u + m[0][1] v + m[0][2]`, `v'` likewise by `m[1]`; finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UvTransform {
+    /// Two rows.
+    pub m: [[f32; 3]; 2],
+}
+
 /// A material parameter: `factor`, times a texture where there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Param<T> {
     /// The constant part.
     pub factor: T,
     /// The varying part.
-    pub texture: Option<TextureId>,
+    pub texture: Option<TextureRef>,
 }
 
 impl<T> Param<T> {

@@ -56,7 +56,8 @@ pub fn add_quad(builder: &mut SceneBuilder, corners: [[f32; 3]; 4], material: Ma
     let mesh = builder.add_mesh(Mesh {
         positions: corners.to_vec(),
         normals: None,
-        uvs: None,
+        uv_sets: Vec::new(),
+        colors: None,
         tangents: None,
         indices: vec![[0, 1, 2], [0, 2, 3]],
         material,

@@ -4,7 +4,7 @@ use super::document::{Document, read_file};
 use super::uri::Source;
 use super::{Loader, Result, name_or};
 use crate::image::decode::{self, Format};
-use crate::texture::Image;
+use crate::texture::{Image, Texels};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -40,7 +40,12 @@ pub(super) fn decode_all(loader: &mut Loader) -> Result<()> {
             let text = format!("/images/{}: said to be {said} but is {format}: read as {format}", encoded.index);
             loader.builder.warn(text);
         }
-        loader.builder.add_image(Image { width: pixels.width, height: pixels.height, texels: pixels.texels, name });
+        loader.builder.add_image(Image {
+            width: pixels.width,
+            height: pixels.height,
+            texels: Texels::Rgba8(pixels.texels),
+            name,
+        });
     }
     Ok(())
 }

@@ -2,8 +2,8 @@
 
 use super::{Loader, Result, extensions, name_or};
 use crate::material::Material;
-use crate::scene::{MaterialId, TextureId};
-use crate::texture::Param;
+use crate::scene::MaterialId;
+use crate::texture::{Param, TextureRef};
 use gltf::json::Index;
 use gltf::json::material::AlphaMode;
 use gltf::json::texture::Info;
@@ -39,9 +39,7 @@ pub(super) fn read(loader: &mut Loader, index: Option<Index<gltf::json::Material
             (Reader { loader, at: &at }.material(found, name)?, at)
         }
     };
-    let colors = [&material.base_color, &material.emission, &material.specular_color].map(|p| p.texture);
-    let scalars = [&material.metallic, &material.roughness, &material.normal, &material.specular].map(|p| p.texture);
-    let textured = colors.iter().chain(&scalars).any(Option::is_some);
+    let textured = material.textures().next().is_some();
     let normal_mapped = material.normal.texture.is_some();
     let read = Read { id: loader.builder.add_material(material), textured, normal_mapped, pointer: at };
     loader.materials.insert(key, read.clone());
@@ -173,7 +171,7 @@ impl Reader<'_, '_> {
         Err(self.loader.doc.bad(&format!("{}/{place}", self.at), "is out of range", fix.trim_end()))
     }
 
-    fn info(&mut self, place: &str, info: Option<&Info>) -> Result<Option<TextureId>> {
+    fn info(&mut self, place: &str, info: Option<&Info>) -> Result<Option<TextureRef>> {
         let Some(info) = info else { return Ok(None) };
         let others = info.extensions.as_ref().map(|e| &e.others);
         self.texture(place, info.index, info.tex_coord, others).map(Some)
@@ -185,7 +183,7 @@ impl Reader<'_, '_> {
         index: Index<gltf::json::Texture>,
         tex_coord: u32,
         others: Option<&serde_json::Map<String, serde_json::Value>>,
-    ) -> Result<TextureId> {
+    ) -> Result<TextureRef> {
         let at = format!("{}/{place}", self.at);
         if tex_coord != 0 {
             let fix = "Only texCoord 0 is read: bake the textures to one set of coordinates.";
@@ -194,6 +192,6 @@ impl Reader<'_, '_> {
         if let Some(others) = others {
             extensions::check_carried(self.loader.doc, others.keys(), &at, &[])?;
         }
-        super::texture::read(self.loader, index, &format!("{at}/index"))
+        super::texture::read(self.loader, index, &format!("{at}/index")).map(TextureRef::plain)
     }
 }

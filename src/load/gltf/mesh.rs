@@ -91,7 +91,8 @@ fn read_primitive(loader: &mut Loader, primitive: &Primitive, at: &str, name: &s
     Ok(Some(Mesh {
         positions: positions.floats(),
         normals: normals.map(|e| e.floats()),
-        uvs: uvs.map(|e| e.uvs()),
+        uv_sets: uvs.map(|e| e.uvs()).into_iter().collect(),
+        colors: None,
         tangents: tangents.map(|e| e.floats()),
         indices: triangles.to_vec(),
         material: surface.id,

@@ -1,0 +1,110 @@
+//! Surfaces that are not all there (alpha MASK and BLEND): rays pass them, from one to the next.
+//!
+//! Whether a ray passes is a function of (seed, frame, pixel, sample, bounce, primitive), so every backend, order of
+//! hits and number of threads decides the same. A ray that passes goes on from just behind the surface: with the same
+//! throughput, the same bounce and the same sampler block.
+
+use super::SceneTables;
+use super::pool::PathPool;
+use super::shade::{add_lanes, load3};
+use crate::accel::MISS;
+use crate::math::{UvSets, V3, robust};
+use crate::sampler::coverage_number;
+use crate::shape::table::{NONE, Triangle};
+use simd::{Float, Kernel, Lanes, Mask, Uint};
+
+/// The lanes of `hit` whose ray passes `primitive`; `key` is of [`crate::sampler::coverage_key`].
+#[inline(always)]
+pub fn passes<L: Lanes>(
+    tables: &SceneTables,
+    material: L::U,
+    uvs: &UvSets<L>,
+    vertex_opacity: L::F,
+    key: L::U,
+    primitive: L::U,
+    hit: L::M,
+) -> L::M {
+    let coverage = tables.materials.coverage::<L>(&tables.textures, material, uvs, vertex_opacity, hit);
+    hit & coverage.le(coverage_number::<L>(key, primitive))
+}
+
+/// Just behind the triangle at `p`, for a ray that travels along `d`.
+#[inline(always)]
+pub fn behind<L: Lanes>(triangle: &Triangle<L>, p: V3<L>, d: V3<L>) -> V3<L> {
+    let along = d.dot(triangle.ng).gt(L::F::zero());
+    robust::offset_point(p, triangle.ng.or_else(along, -triangle.ng), triangle.offset_length())
+}
+
+/// One step of all shadow rays: what reaches its light is added, what is blocked is dropped, what passes a surface is
+/// packed to the front with its new origin.
+pub struct ShadowThrough<'a> {
+    pub tables: &'a SceneTables,
+    pub pool: &'a mut PathPool,
+}
+
+impl Kernel for ShadowThrough<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { tables, pool } = self;
+        let n = pool.n_shadow;
+        pool.n_shadow = 0;
+        for at in (0..n).step_by(L::N) {
+            step::<L>(tables, pool, at, L::M::first(n - at));
+        }
+    }
+}
+
+/// Shadow rays `at ..` in the lanes of `active`.
+#[inline(always)]
+fn step<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, active: L::M) {
+    let primitive = L::U::load(&pool.shadow_hits.primitive, at);
+    let slot = L::U::load(&pool.shadow_slot, at);
+    let radiance = load3::<L>(&pool.shadow_radiance[0], &pool.shadow_radiance[1], &pool.shadow_radiance[2], at);
+    let free = active & primitive.eq(L::U::splat(MISS));
+    if free.any() {
+        add_lanes::<L>(pool, slot, radiance, free);
+    }
+    let hit = active & !free;
+    if !hit.any() {
+        return;
+    }
+    let triangle = tables.triangles.get::<L>(primitive);
+    let (u, v) = (L::F::load(&pool.shadow_hits.u, at), L::F::load(&pool.shadow_hits.v, at));
+    let mut uvs = UvSets::single(L::F::zero(), L::F::zero());
+    let mut vertex_opacity = L::F::one();
+    if tables.triangles.has_attributes() {
+        let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
+        if has.any() {
+            let a = tables.triangles.attributes::<L>(triangle.attributes, u, v);
+            uvs = a.uvs.masked(has);
+            vertex_opacity = a.opacity.or_else(has, vertex_opacity);
+        }
+    }
+    let key = L::U::load(&pool.shadow_key, at);
+    let passes = passes::<L>(tables, triangle.material, &uvs, vertex_opacity, key, primitive, hit);
+    if !passes.any() {
+        return;
+    }
+    let origin = load3::<L>(&pool.shadow.ox, &pool.shadow.oy, &pool.shadow.oz, at);
+    let d = load3::<L>(&pool.shadow.dx, &pool.shadow.dy, &pool.shadow.dz, at);
+    let t_max = L::F::load(&pool.shadow.t_max, at);
+    let start = behind(&triangle, triangle.point(u, v), d);
+    // Towards the same end point, which lies at t = 1; a distant light has none.
+    let d = (origin + d - start).or_else(t_max.is_finite(), d);
+    let to = pool.n_shadow;
+    start.x.compress(passes, &mut pool.shadow.ox, to);
+    start.y.compress(passes, &mut pool.shadow.oy, to);
+    start.z.compress(passes, &mut pool.shadow.oz, to);
+    d.x.compress(passes, &mut pool.shadow.dx, to);
+    d.y.compress(passes, &mut pool.shadow.dy, to);
+    d.z.compress(passes, &mut pool.shadow.dz, to);
+    t_max.compress(passes, &mut pool.shadow.t_max, to);
+    key.compress(passes, &mut pool.shadow_key, to);
+    slot.compress(passes, &mut pool.shadow_slot, to);
+    radiance.x.compress(passes, &mut pool.shadow_radiance[0], to);
+    radiance.y.compress(passes, &mut pool.shadow_radiance[1], to);
+    radiance.z.compress(passes, &mut pool.shadow_radiance[2], to);
+    pool.n_shadow += passes.count();
+}

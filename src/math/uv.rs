@@ -1,0 +1,58 @@
+//! Texture coordinates of hits over N lanes.
+
+use simd::{Float, Lanes, Uint};
+
+/// Sets of texture coordinates that one material may use. (A mesh may have more: the loader keeps those in use.)
+pub const MAX_UV_SETS: usize = 4;
+
+/// One or several pairs of texture coordinates per lane.
+#[derive(Clone, Copy)]
+pub struct UvSets<L: Lanes> {
+    sets: [[L::F; 2]; MAX_UV_SETS],
+    /// Sets that some lane has; the others are not read.
+    n: usize,
+}
+
+impl<L: Lanes> UvSets<L> {
+    /// One set.
+    #[inline(always)]
+    pub fn single(u: L::F, v: L::F) -> Self {
+        let zero = L::F::zero();
+        Self { sets: [[u, v], [zero, zero], [zero, zero], [zero, zero]], n: 1 }
+    }
+
+    /// Adds set `k`, 1 and up in this order.
+    #[inline(always)]
+    pub fn set(&mut self, k: usize, u: L::F, v: L::F) {
+        self.sets[k] = [u, v];
+        self.n = k + 1;
+    }
+
+    /// 0 in the lanes that are not `keep`.
+    #[inline(always)]
+    pub fn masked(mut self, keep: L::M) -> Self {
+        for k in 0..MAX_UV_SETS {
+            if k < self.n {
+                let [u, v] = self.sets[k];
+                self.sets[k] = [u.masked(keep), v.masked(keep)];
+            }
+        }
+        self
+    }
+
+    /// The coordinates in set `which` per lane.
+    #[inline(always)]
+    pub fn get(&self, which: L::U) -> [L::F; 2] {
+        let [mut u, mut v] = self.sets[0];
+        if self.n > 1 {
+            for k in 1..MAX_UV_SETS {
+                if k < self.n {
+                    let here = which.eq(L::U::splat(k as u32));
+                    u = self.sets[k][0].or_else(here, u);
+                    v = self.sets[k][1].or_else(here, v);
+                }
+            }
+        }
+        [u, v]
+    }
+}
