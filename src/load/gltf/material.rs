@@ -16,8 +16,9 @@ const ROUNDING: f32 = 1e-5;
 #[derive(Clone, Debug)]
 pub(super) struct Read {
     pub id: MaterialId,
-    /// Some parameter has a texture, so uvs are needed.
-    pub textured: bool,
+    /// The file's sets of texture coordinates that its textures name, in the order of
+    /// [`TextureRef::uv_set`](crate::texture::TextureRef); empty without textures.
+    pub tex_coords: Vec<u32>,
     /// There is a normal map, so tangents are needed.
     pub normal_mapped: bool,
     /// For messages.
@@ -39,9 +40,9 @@ pub(super) fn read(loader: &mut Loader, index: Option<Index<gltf::json::Material
             (Reader { loader, at: &at }.material(found, name)?, at)
         }
     };
-    let textured = material.textures().next().is_some();
+    let tex_coords = if material.textures().next().is_some() { vec![0] } else { Vec::new() };
     let normal_mapped = material.normal.texture.is_some();
-    let read = Read { id: loader.builder.add_material(material), textured, normal_mapped, pointer: at };
+    let read = Read { id: loader.builder.add_material(material), tex_coords, normal_mapped, pointer: at };
     loader.materials.insert(key, read.clone());
     Ok(read)
 }

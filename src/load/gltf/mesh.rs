@@ -53,15 +53,15 @@ fn read_primitive(loader: &mut Loader, primitive: &Primitive, at: &str, name: &s
     let surface = material::read(loader, primitive.material, &format!("{at}/material"))?;
     let attributes = Attributes { loader, primitive, at };
     let normals = attributes.open(&Semantic::Normals, &NORMAL, Some(n))?;
-    let uvs = match surface.textured {
-        false => None,
-        true => attributes.open(&Semantic::TexCoords(0), &TEXCOORD, Some(n))?,
+    let uvs = match surface.tex_coords.is_empty() {
+        true => None,
+        false => attributes.open(&Semantic::TexCoords(0), &TEXCOORD, Some(n))?,
     };
     let tangents = match surface.normal_mapped {
         false => None,
         true => attributes.open(&Semantic::Tangents, &TANGENT, Some(n))?,
     };
-    if surface.textured && uvs.is_none() {
+    if !surface.tex_coords.is_empty() && uvs.is_none() {
         let fix = format!("Its material ({}) has textures, which need TEXCOORD_0.", surface.pointer);
         return Err(doc.error(format!("{at}/attributes"), "no TEXCOORD_0", fix));
     }
