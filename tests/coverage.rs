@@ -336,7 +336,9 @@ fn meshes_with_and_without_further_attributes_share_a_scene() {
     // Lanes of one vector hit triangles with no coordinates although their texture needs them, two sets, and colours: the small picture
     // must equal a picture of each pixel on its own (crops), whatever its neighbours hit.
     let mut builder = SceneBuilder::new(0);
-    let texture = add_texture(&mut builder, &[[255, 0, 0, 255], [0, 255, 0, 255]]);
+    // Every texel differs from the first, which stands for coordinates that are not there.
+    let texels: Vec<[u8; 4]> = (0..=255).map(|i| [255 - i, i, 128, 255]).collect();
+    let texture = add_texture(&mut builder, &texels);
     let reads = |uv_set| Some(TextureRef { texture, uv_set, transform: None });
     for k in 0..4_u8 {
         let base_color = Param { factor: [0.9; 3], texture: reads(u32::from(k == 2)) };
