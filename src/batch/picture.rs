@@ -78,6 +78,8 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
         ("prt:accel", ExrValue::Text(stats.accel.used.into())),
         ("prt:integrator", ExrValue::Text("path".into())),
         ("prt:brdf", ExrValue::Text(brdf_name(settings.brdf).into())),
+        // Part of the shading model (docs/conventions.md, "Shading normals").
+        ("prt:normals", ExrValue::Text("repaired, terminator".into())),
         ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
         ("prt:truncated", ExrValue::Double(stats.truncated)),
         ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
@@ -146,7 +148,7 @@ mod tests {
         let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
         #[rustfmt::skip]
         assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
-            "prt:nonFinite", "prt:truncated", "prt:biased"]);
+            "prt:normals", "prt:nonFinite", "prt:truncated", "prt:biased"]);
     }
 
     #[test]

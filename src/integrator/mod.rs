@@ -4,8 +4,11 @@
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
 mod coverage;
+mod interaction;
+mod normals;
 mod pool;
 mod shade;
+mod terminator;
 mod wave;
 
 pub use wave::{Counters, SampleSink, Unit, Worker};
@@ -28,6 +31,13 @@ pub struct SceneTables {
     pub textures: TextureTable,
     /// Lights with selection probabilities.
     pub lights: LightTable,
+}
+
+impl SceneTables {
+    /// Whether any surface is shaded with another normal than its triangle's.
+    pub(crate) fn has_shading_normals(&self) -> bool {
+        self.triangles.has_normals() || self.triangles.has_tangents() || self.materials.has_bump()
+    }
 }
 
 /// A path tracer for one picture: tables, rays, settings. Shared by all workers.

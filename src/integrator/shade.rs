@@ -1,51 +1,26 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
 use super::coverage::{behind, passes};
+use super::interaction::{Interaction, interact};
+use super::normals::shading_normal;
 use super::pool::PathPool;
 use super::wave::Counters;
 use super::{PathTracer, SceneTables};
 use crate::accel::MISS;
 use crate::material::bsdf::{Bsdf, Surface};
-use crate::math::{Frame, UvSets, V3, robust};
+use crate::math::bend::let_mirror_leave;
+use crate::math::{Frame, V3};
 use crate::sampler::{Key, coverage_key, dims};
-use crate::shape::table::{NONE, Triangle};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
 
 /// Roulette starts after this many scatterings: earlier, it disturbs the stratification for more than it saves.
 const ROULETTE_DEPTH: u32 = 5;
-
-/// Smallest cosine between view and shading normal. Where interpolation or a normal map turns the normal away from the
-/// viewer, it is bent back to this.
-const MIN_VIEW_COSINE: f32 = 0.01;
 
 /// Shades all hits of a pool: survivors are packed to the front, shadow rays queued, ended paths listed.
 pub struct Shade<'a, 'b> {
     pub tracer: &'a PathTracer<'b>,
     pub pool: &'a mut PathPool,
     pub counters: &'a mut Counters,
-}
-
-/// Where a path hit and how it looks from there.
-struct Interaction<L: Lanes> {
-    triangle: Triangle<L>,
-    /// Hit point, from barycentric coordinates.
-    p: V3<L>,
-    wo: V3<L>,
-    /// Geometric normal on the viewer's side.
-    ng: V3<L>,
-    /// The front side was hit.
-    front: L::M,
-    /// Texture coordinates.
-    uvs: UvSets<L>,
-    /// Vertex colour; white where there is none.
-    color: V3<L>,
-    /// Opacity of the vertex colour.
-    opacity: L::F,
-    /// Interpolated normal as given (front side up, not normalised) and where there is one.
-    normal: V3<L>,
-    has_normal: L::M,
-    /// Barycentric coordinates.
-    b: [L::F; 2],
 }
 
 /// Where the paths go on.
@@ -124,8 +99,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
     let scatters = hit & allowed;
     let bsdf = closure::<L>(tables, &si, scatters);
-    // Off the surface on the viewer's side; reflection only, so all rays leave there.
-    let start = robust::offset_point(si.p, si.ng, si.triangle.offset_length());
+    let start = si.start();
 
     if !tables.lights.is_empty() {
         let u = key.group(depth + depth + L::U::splat(dims::FIRST_LIGHT));
@@ -139,8 +113,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let u = key.group(depth + depth + L::U::splat(dims::FIRST_BSDF));
     let sample = bsdf.sample([u[0], u[1]], u[2]);
     let mut beta = beta * sample.weight;
-    let above = sample.wi.dot(si.ng).gt(L::F::zero());
-    let mut alive = scatters & sample.valid & above;
+    let mut alive = scatters & sample.valid & si.is_outside(sample.wi);
     let broken = alive & !(beta.is_finite() & sample.wi.is_finite());
     if broken.any() {
         add_lanes::<L>(pool, slot, V3::splat([f32::NAN; 3]), broken);
@@ -191,32 +164,6 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     pool.n += alive.count();
 }
 
-/// Geometry of the hits.
-#[inline(always)]
-fn interact<L: Lanes>(tables: &SceneTables, pool: &PathPool, at: usize, primitive: L::U, hit: L::M) -> Interaction<L> {
-    let zero = L::F::zero();
-    let triangle = tables.triangles.get::<L>(primitive);
-    let b = [L::F::load(&pool.hits.u, at), L::F::load(&pool.hits.v, at)];
-    let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
-    let front = wo.dot(triangle.ng).gt(zero);
-    let ng = triangle.ng.or_else(front, -triangle.ng);
-    let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, L::M::from_bits(0));
-    let (mut color, mut opacity) = (V3::splat([1.0; 3]), L::F::one());
-    if tables.triangles.has_attributes() {
-        let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
-        if has.any() {
-            let a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
-            uvs = a.uvs.masked(has);
-            if tables.triangles.has_colors() {
-                (color, opacity) = (a.color.or_else(has, color), a.opacity.or_else(has, opacity));
-            }
-            has_normal = has & a.has_normal;
-            normal = a.normal.or_else(has_normal, normal);
-        }
-    }
-    Interaction { p: triangle.point(b[0], b[1]), triangle, wo, ng, front, uvs, color, opacity, normal, has_normal, b }
-}
-
 /// Textures and vertex colours applied.
 #[inline(always)]
 fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Surface<L> {
@@ -232,37 +179,15 @@ fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) ->
 #[inline(always)]
 fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<L> {
     let surface = surface(tables, si, active);
-    let mut ns = si.ng;
-    if tables.triangles.has_attributes() && si.has_normal.any() {
-        let mut normal = si.normal.normalized();
-        if tables.triangles.has_tangents() {
-            let mapped = si.has_normal & !si.triangle.tangents.eq(L::U::splat(NONE));
-            if mapped.any() {
-                normal = map_normal(tables, si, normal, mapped);
-            }
-        }
-        // The viewer's side; where it cannot be used, the geometric normal.
-        let turned = normal.or_else(si.front, -normal);
-        let usable = si.has_normal & turned.is_finite();
-        ns = turned.or_else(usable, ns);
-        let cos = si.wo.dot(ns);
-        let short = (L::F::splat(MIN_VIEW_COSINE) - cos).max(L::F::zero());
-        let bent = si.wo.mul_add(short, ns).normalized();
-        ns = bent.or_else(usable & short.gt(L::F::zero()), ns);
+    if !tables.has_shading_normals() {
+        return Bsdf::new(surface, Frame::around(si.ng), si.wo);
     }
-    Bsdf::new(surface, Frame::around(ns), si.wo)
-}
-
-/// The shading normal (front side up) with the material's normal map applied.
-#[inline(always)]
-fn map_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L>, mapped: L::M) -> V3<L> {
-    let (t, handedness) = tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1]);
-    let (m, has) = tables.materials.normal_map::<L>(&tables.textures, si.triangle.material, &si.uvs, mapped);
-    // glTF 3.7.2.1: bitangent = cross(normal, tangent) x handedness. The tangent is used as interpolated, made unit.
-    let t = (t - normal.scale(normal.dot(t))).normalized();
-    let b = normal.cross(t).scale(handedness);
-    let n = t.mul_add(m.x, b.mul_add(m.y, normal.scale(m.z))).normalized();
-    n.or_else(has & n.is_finite(), normal)
+    let ns = shading_normal(tables, si, active);
+    // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
+    let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
+    let low = low & active & surface.has_specular();
+    let bsdf = Bsdf::new(surface, Frame::around(bent.or_else(low, ns)), si.wo);
+    if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
 }
 
 /// Next event estimation: queues a shadow ray with its finished contribution; the lanes that have one.
@@ -280,12 +205,12 @@ fn queue_light_sample<L: Lanes>(
     scatters: L::M,
 ) -> L::M {
     let (zero, one) = (L::F::zero(), L::F::one());
-    let light = tables.lights.sample::<L>(si.p, u, &tables.triangles, &tables.materials, &tables.textures);
+    let light = tables.lights.sample::<L>(si.origin, u, &tables.triangles, &tables.materials, &tables.textures);
     let value = bsdf.eval(light.wi);
     let ratio = value.pdf / light.pdf;
     let weight = one.or_else(light.is_delta, one / ratio.mul_add(ratio, one));
     let arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
-    let sees = scatters & light.valid & light.wi.dot(si.ng).gt(zero);
+    let sees = scatters & light.valid & si.is_outside(light.wi);
     let broken = sees & !arriving.is_finite();
     if broken.any() {
         add_lanes::<L>(pool, slot, V3::splat([f32::NAN; 3]), broken);

@@ -20,6 +20,12 @@ pub const DELTA_ALPHA: f32 = 1e-4;
 pub struct Bsdf<L: Lanes> {
     /// Local frame about the shading normal.
     pub frame: Frame<L>,
+    /// Normal of the diffuse lobe, local, unit; (0, 0, 1) but where [`Bsdf::with_diffuse_normal`] says otherwise.
+    diffuse_normal: V3<L>,
+    /// Lanes where it does.
+    is_split: L::M,
+    /// Some lane of them. Only a shortcut.
+    has_split: bool,
     /// Towards the viewer, local, unit, z > 0.
     wo: V3<L>,
     /// Base colour.
@@ -38,6 +44,8 @@ pub struct Bsdf<L: Lanes> {
     is_delta: L::M,
     /// Lanes with nothing but the diffuse lobe.
     is_diffuse: L::M,
+    /// Lanes that reflect at all: a specular surface seen from below its shading horizon does not.
+    is_seen: L::M,
     /// Some lane has a specular lobe. Only a shortcut: a lane's bits must not depend on its neighbours.
     has_specular: bool,
 }
@@ -77,18 +85,29 @@ pub struct Surface<L: Lanes> {
     pub f0: V3<L>,
 }
 
+impl<L: Lanes> Surface<L> {
+    /// The lanes that have more than the diffuse lobe.
+    #[inline(always)]
+    pub fn has_specular(&self) -> L::M {
+        self.metallic.gt(L::F::zero()) | self.specular.gt(L::F::zero())
+    }
+}
+
 impl<L: Lanes> Bsdf<L> {
-    /// The closure for a surface seen from world direction `wo`; `wo . frame.z` must be positive.
+    /// The closure for a surface seen from world direction `wo`. Where `wo . frame.z` is not positive, a surface with a
+    /// specular lobe reflects nothing.
     #[inline(always)]
     pub fn new(surface: Surface<L>, frame: Frame<L>, wo: V3<L>) -> Self {
         let (zero, one) = (L::F::zero(), L::F::one());
+        let has_specular = surface.has_specular();
         let Surface { base, metallic, roughness, specular, f0 } = surface;
         let alpha = roughness * roughness;
         let wo = frame.to_local(wo);
+        let is_diffuse = !has_specular;
+        let is_seen = is_diffuse | wo.z.gt(zero);
         let wo = V3::<L>::new(wo.x, wo.y, wo.z.max(L::F::splat(1e-6)));
         let dielectric = one - metallic;
-        let is_diffuse = !(metallic.gt(zero) | specular.gt(zero));
-        let has_specular = (!is_diffuse).any();
+        let has_specular = has_specular.any();
         let specular_pmf = if has_specular {
             // Shares of the albedo at this angle, as if the half vector were the normal.
             let s5 = pow5(one - wo.z.min(one));
@@ -106,6 +125,9 @@ impl<L: Lanes> Bsdf<L> {
         let alpha = alpha.max(L::F::splat(DELTA_ALPHA));
         Self {
             frame,
+            diffuse_normal: V3::splat([0.0, 0.0, 1.0]),
+            is_split: L::M::from_bits(0),
+            has_split: false,
             wo,
             base,
             metallic,
@@ -115,8 +137,23 @@ impl<L: Lanes> Bsdf<L> {
             specular_pmf,
             is_delta,
             is_diffuse,
+            is_seen,
             has_specular,
         }
+    }
+
+    /// The same with the diffuse lobe about the world normal `normal` (unit) in `lanes`: the specular lobe's normal may
+    /// have been bent for its mirror's sake, which is no matter of the diffuse one.
+    #[inline(always)]
+    pub fn with_diffuse_normal(self, normal: V3<L>, lanes: L::M) -> Self {
+        let normal = self.frame.to_local(normal).normalized().or_else(lanes, self.diffuse_normal);
+        Self { diffuse_normal: normal, is_split: lanes, has_split: lanes.any(), ..self }
+    }
+
+    /// Cosine between local `wi` and the diffuse lobe's normal.
+    #[inline(always)]
+    fn diffuse_cosine(&self, wi: V3<L>) -> L::F {
+        if self.has_split { wi.dot(self.diffuse_normal).or_else(self.is_split, wi.z) } else { wi.z }
     }
 
     /// Fresnel of the metal and of the dielectric layer (before `weight`) at `cos` between view and half vector.
@@ -127,15 +164,18 @@ impl<L: Lanes> Bsdf<L> {
         (self.base + (white - self.base).scale(s5), self.f0 + (white - self.f0).scale(s5))
     }
 
-    /// Value and density for local direction `wi` with `wi.z > 0`.
+    /// Value and density for local direction `wi`; each lobe is zero below its horizon.
     #[inline(always)]
     fn eval_local(&self, wi: V3<L>) -> BsdfValue<L> {
         let (zero, one) = (L::F::zero(), L::F::one());
-        let cosine_pdf = wi.z * L::F::splat(FRAC_1_PI);
+        let cosine_pdf = self.diffuse_cosine(wi).max(zero) * L::F::splat(FRAC_1_PI);
         let dielectric = one - self.metallic;
         if !self.has_specular {
             return BsdfValue { f_cos: self.base.scale(dielectric * cosine_pdf), pdf: cosine_pdf };
         }
+        let cosine_pdf = cosine_pdf.masked(self.is_seen);
+        let glossy = wi.z.gt(zero) & self.is_seen & !self.is_delta;
+        let wi = V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12)));
         let h = (self.wo + wi).normalized();
         let (metal, layer) = self.fresnel(self.wo.dot(h));
         let under = one - self.weight * layer.max_component();
@@ -146,8 +186,8 @@ impl<L: Lanes> Bsdf<L> {
         let lambda_i = masking(wi, a2);
         let g2 = one / (one + lambda_o + lambda_i);
         let reflectance = metal.scale(self.metallic) + layer.scale(dielectric * self.weight);
-        let specular = reflectance.scale(d * g2 / (L::F::splat(4.0) * self.wo.z)).masked(!self.is_delta);
-        let specular_pdf = self.specular_pdf(d).masked(!self.is_delta);
+        let specular = reflectance.scale(d * g2 / (L::F::splat(4.0) * self.wo.z)).masked(glossy);
+        let specular_pdf = self.specular_pdf(d).masked(glossy);
         let pdf = (one - self.specular_pmf) * cosine_pdf + self.specular_pmf * specular_pdf;
         // Values are finite unless alpha is tiny and h the normal to the last bit; 0 x inf must not become NaN.
         BsdfValue { f_cos: diffuse + specular, pdf: pdf.max(zero) }
@@ -182,10 +222,7 @@ impl<L: Lanes> Bsdf<L> {
     /// Value and density for world direction `wi`; zero below the shading horizon.
     #[inline(always)]
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {
-        let wi = self.frame.to_local(wi);
-        let above = wi.z.gt(L::F::zero());
-        let value = self.eval_local(V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12))));
-        BsdfValue { f_cos: value.f_cos.masked(above), pdf: value.pdf.masked(above) }
+        self.eval_local(self.frame.to_local(wi))
     }
 
     /// A direction from the mixture of both lobes, by `u` (direction) and `u_lobe`.
@@ -217,9 +254,12 @@ impl<L: Lanes> Bsdf<L> {
         let h = V3::<L>::new(zero, zero, one).or_else(self.is_delta, h);
         let cos_h = self.wo.dot(h);
         let mirrored = h.scale(cos_h + cos_h) - self.wo;
+        let mut diffuse = diffuse;
+        if self.has_split {
+            diffuse = Frame::around(self.diffuse_normal).to_world(diffuse).or_else(self.is_split, diffuse);
+        }
         let wi = mirrored.or_else(from_specular, diffuse);
-        let above = wi.z.gt(zero);
-        let value = self.eval_local(V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12))));
+        let value = self.eval_local(wi);
         let weight = albedo.or_else(self.is_diffuse, value.f_cos.scale(one / value.pdf));
         // The mirror: reflectance over the probability of having chosen it.
         let mirror = from_specular & self.is_delta;
@@ -230,7 +270,8 @@ impl<L: Lanes> Bsdf<L> {
             wi: self.frame.to_world(wi),
             weight: mirror_weight.or_else(mirror, weight),
             pdf: L::F::splat(f32::INFINITY).or_else(mirror, value.pdf),
-            valid: above & (mirror | value.pdf.gt(zero)),
+            // A specular sample below its horizon is lost, even where the diffuse lobe reaches.
+            valid: (wi.z.gt(zero) | !from_specular) & self.is_seen & (mirror | value.pdf.gt(zero)),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Materials as described by the file, in glTF's names.
 
 pub mod bsdf;
+mod bump;
 pub mod table;
 
 use crate::texture::{Param, TextureRef};

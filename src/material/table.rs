@@ -3,6 +3,7 @@
 use super::bsdf::Surface;
 use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
+use crate::texture::TextureRef;
 use crate::texture::lookup::{Encoding, NO_TEXTURE, TextureTable};
 use simd::{Float, Lanes, Mask, Uint};
 
@@ -25,7 +26,7 @@ const METALLIC_WITH_ROUGHNESS: u32 = 32;
 /// | 3 | emission r | g | b | emission texture |
 /// | 4 | base texture | roughness | normal | specular |
 /// | 5 | specular colour texture | metallic, if it is not roughness' | opacity | bump |
-/// | 6 | alpha cutoff | bump height | - | - |
+/// | 6 | alpha cutoff | bump height | bump without transform | - |
 ///
 /// Textures are bindings of the scene's [`TextureTable`].
 #[derive(Clone, Debug, Default)]
@@ -39,6 +40,8 @@ pub struct MaterialTable {
     has_alpha: bool,
     /// Some material is unlit.
     has_unlit: bool,
+    /// Some material has a height map.
+    has_bump: bool,
 }
 
 impl MaterialTable {
@@ -71,14 +74,16 @@ impl MaterialTable {
         let reflectance = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
         let f0 = m.specular_color.factor.map(|c| reflectance * c);
         let metallic = if shares { None } else { m.metallic.texture };
+        let bump = if m.bump.factor == 0.0 { None } else { m.bump.texture };
+        let plain_bump = bump.map(|b| TextureRef::plain(b.texture));
         self.records.extend([
             [r, g, b, f32::from_bits(flags)],
             [m.metallic.factor, m.roughness.factor, m.specular.factor, m.normal.factor],
             [f0[0], f0[1], f0[2], m.opacity.factor],
             [er, eg, eb, id(m.emission.texture)],
             [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
-            [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(m.bump.texture)],
-            [cutoff, m.bump.factor, 0.0, 0.0],
+            [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(bump)],
+            [cutoff, m.bump.factor, id(plain_bump), 0.0],
         ]);
         let textures = [
             m.base_color.texture,
@@ -91,6 +96,7 @@ impl MaterialTable {
         self.is_emissive |= emits;
         self.has_alpha |= alpha != 0;
         self.has_unlit |= m.unlit;
+        self.has_bump |= bump.is_some();
     }
 
     /// Whether anything emits at all.
@@ -111,6 +117,11 @@ impl MaterialTable {
     /// Whether anything is unlit.
     pub fn has_unlit(&self) -> bool {
         self.has_unlit
+    }
+
+    /// Whether anything has a height map.
+    pub fn has_bump(&self) -> bool {
+        self.has_bump
     }
 
     /// The lanes whose material is unlit.
@@ -149,7 +160,7 @@ impl MaterialTable {
     }
 
     #[inline(always)]
-    fn record<L: Lanes>(&self, material: L::U, k: u32) -> [L::F; 4] {
+    pub(super) fn record<L: Lanes>(&self, material: L::U, k: u32) -> [L::F; 4] {
         (material * L::U::splat(RECORDS) + L::U::splat(k)).records(&self.records)
     }
 

@@ -1,5 +1,6 @@
-//! Vectors over lanes, frames, rounding bounds and ray origins. glam serves everything scalar.
+//! Vectors over lanes, frames, shading normals kept usable, rounding bounds and ray origins. glam serves everything scalar.
 
+pub mod bend;
 mod frame;
 pub mod lanes;
 pub mod robust;

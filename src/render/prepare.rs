@@ -31,10 +31,13 @@ pub struct Prepared {
     pub warnings: Vec<String>,
 }
 
-/// Triangles left out because flattening made them unusable.
+/// Triangles that flattening had to mend.
 #[derive(Default)]
-struct Dropped {
+struct Mended {
+    /// Left out: without area once placed.
     without_area: usize,
+    /// Their vertex normals all pointed to the back, and were turned round.
+    turned_normals: usize,
 }
 
 /// Prepares `scene`.
@@ -54,13 +57,20 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     let mut triangles = TriangleTable::with_capacity(count);
     let mut geometry = Triangles::default();
     let mut lights = Vec::new();
-    let mut dropped = Dropped::default();
+    let mut mended = Mended::default();
     for instance in &scene.instances {
-        flatten(scene, instance, origin, &mut geometry, &mut triangles, &mut lights, &mut dropped);
+        flatten(scene, instance, origin, &mut geometry, &mut triangles, &mut lights, &mut mended);
     }
     let mut warnings = Vec::new();
-    if dropped.without_area > 0 {
-        warnings.push(format!("{} triangles have no area once placed and were dropped", dropped.without_area));
+    if mended.without_area > 0 {
+        warnings.push(format!("{} triangles have no area once placed and were dropped", mended.without_area));
+    }
+    if mended.turned_normals > 0 {
+        warnings.push(format!(
+            "{} triangles have vertex normals that point to their back; they were turned to the front, which is \
+             counter-clockwise",
+            mended.turned_normals
+        ));
     }
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
     punctual(scene, origin, radius, &mut lights);
@@ -99,7 +109,7 @@ fn flatten(
     geometry: &mut Triangles,
     table: &mut TriangleTable,
     lights: &mut Vec<(PreparedLight, f64)>,
-    dropped: &mut Dropped,
+    mended: &mut Mended,
 ) {
     let mesh = &scene.meshes[instance.mesh.index()];
     let material = scene.materials.get(mesh.material.index());
@@ -124,17 +134,29 @@ fn flatten(
         let cross = (edges[1] - edges[0]).cross(edges[2] - edges[0]);
         let area = 0.5 * cross.length();
         if area == 0.0 || !area.is_finite() {
-            dropped.without_area += 1;
+            mended.without_area += 1;
             continue;
         }
         let ng = (cross / (2.0 * area)).as_vec3();
-        let attributes =
-            if needs_attributes { push_attributes(mesh, [i, j, k], normal_from_object, table) } else { NONE };
+        let mut normals = mesh.normals.as_ref().map(|n| {
+            [i, j, k].map(|v| {
+                let n = glam::Vec3::from(n[v as usize]).as_dvec3();
+                (normal_from_object * n).normalize_or_zero().as_vec3()
+            })
+        });
+        // As pbrt does: normals against the winding would light the triangle from behind.
+        let turns = normals.is_some_and(|n| n.iter().all(|n| n.dot(ng) < 0.0));
+        if turns {
+            mended.turned_normals += 1;
+            normals = normals.map(|n| n.map(|n| -n));
+        }
+        let attributes = if needs_attributes { push_attributes(mesh, [i, j, k], normals, table) } else { NONE };
         let tangents = mesh.tangents.as_ref().map_or(NONE, |t| {
             table.push_tangents([i, j, k].map(|v| {
                 let [x, y, z, w] = t[v as usize];
                 let t = (linear * DVec3::new(f64::from(x), f64::from(y), f64::from(z))).normalize_or_zero().as_vec3();
-                [t.x, t.y, t.z, if mirrors { -w } else { w }]
+                // The bitangent stays when the normal turns.
+                [t.x, t.y, t.z, if mirrors != turns { -w } else { w }]
             }))
         });
         let primitive = geometry.indices.len() as u32;
@@ -150,13 +172,7 @@ fn flatten(
 }
 
 /// Attributes of a triangle's corners.
-fn push_attributes(mesh: &Mesh, corners: [u32; 3], normal_from_object: DMat3, table: &mut TriangleTable) -> u32 {
-    let normals = mesh.normals.as_ref().map(|n| {
-        corners.map(|v| {
-            let n = glam::Vec3::from(n[v as usize]).as_dvec3();
-            (normal_from_object * n).normalize_or_zero().as_vec3()
-        })
-    });
+fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 3]>, table: &mut TriangleTable) -> u32 {
     let uvs = mesh.uv_sets.iter().map(|set| corners.map(|v| set[v as usize])).collect();
     let colors = mesh.colors.as_ref().map(|c| corners.map(|v| c[v as usize]));
     table.push_attributes(&Corners { normals, uvs, colors })

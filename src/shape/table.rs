@@ -40,6 +40,8 @@ pub struct TriangleTable {
     attributes: Vec<[f32; 4]>,
     /// Most sets of coordinates of any triangle, at least 1.
     uv_sets: usize,
+    /// Some triangle has normals.
+    has_normals: bool,
     /// Some triangle has vertex colours.
     has_colors: bool,
     /// Three a triangle with a normal map: tangent and handedness of each corner.
@@ -72,6 +74,8 @@ pub struct Triangle<L: Lanes> {
 pub struct Attributes<L: Lanes> {
     /// Shading normal, not normalised; arbitrary where `has_normal` is false.
     pub normal: V3<L>,
+    /// Unit (or zero) shading normals of the corners; arbitrary where `has_normal` is false.
+    pub corner_normals: [V3<L>; 3],
     /// Whether the mesh gives normals.
     pub has_normal: L::M,
     /// Texture coordinates, v = 0 at the top.
@@ -117,6 +121,7 @@ impl TriangleTable {
             self.attributes.push([a[0], a[1], b[0], b[1]]);
             self.attributes.push([c[0], c[1], 0.0, 0.0]);
         }
+        self.has_normals |= normals.is_some();
         self.has_colors |= colors.is_some();
         self.uv_sets = self.uv_sets.max(1 + more);
         index
@@ -146,6 +151,11 @@ impl TriangleTable {
     /// Any triangle with normals or texture coordinates.
     pub fn has_attributes(&self) -> bool {
         !self.attributes.is_empty()
+    }
+
+    /// Any triangle with normals.
+    pub fn has_normals(&self) -> bool {
+        self.has_normals
     }
 
     /// Any triangle with vertex colours.
@@ -194,6 +204,7 @@ impl TriangleTable {
         let n2 = V3::<L>::new(a2[0], a2[1], a2[2]);
         let mut attributes = Attributes {
             normal: interpolate3(n0, n1, n2, u, v),
+            corner_normals: [n0, n1, n2],
             has_normal: flags.has(HAS_NORMALS),
             uvs: UvSets::single(
                 interpolate::<L>(a0[3], a2[3], a3[1], u, v),

@@ -105,6 +105,24 @@ impl TextureTable {
         (self.bindings.len() - 1) as u32
     }
 
+    /// The coordinates at which binding `id` reads: its set, transformed.
+    #[inline(always)]
+    pub fn coordinates<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>) -> [L::F; 2] {
+        let flags = id.records(&self.headers)[3].to_bits();
+        let [u, v] = uvs.get(flags.shr(UV_SET_SHIFT));
+        let row = id.min(L::U::splat(self.headers.len() as u32 - 1)).shl(1);
+        let [a, b, c, _] = row.records(&self.transforms);
+        let [d, e, f, _] = (row + L::U::splat(1)).records(&self.transforms);
+        [a.mul_add(u, b.mul_add(v, c)), d.mul_add(u, e.mul_add(v, f))]
+    }
+
+    /// Width and height of binding `id`, texels.
+    #[inline(always)]
+    pub fn size<L: Lanes>(&self, id: L::U) -> [L::F; 2] {
+        let [_, width, height, _] = id.records(&self.headers);
+        [width.to_bits().to_float(), height.to_bits().to_float()]
+    }
+
     /// The binding `id` at the coordinates that it asks for; a lane whose id is [`NO_TEXTURE`] reads anything.
     #[inline(always)]
     pub fn lookup<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {

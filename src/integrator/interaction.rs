@@ -1,0 +1,103 @@
+//! Where a path has hit: geometry, attributes, the normals it is shaded with, and the point from which it goes on.
+
+use super::SceneTables;
+use super::pool::PathPool;
+use super::shade::load3;
+use super::terminator::lift;
+use crate::math::{UvSets, V3, robust};
+use crate::shape::table::{NONE, Triangle};
+use simd::{Float, Lanes, Mask, Uint};
+
+/// Where a path hit and how it looks from there.
+pub(super) struct Interaction<L: Lanes> {
+    pub triangle: Triangle<L>,
+    /// Hit point, from barycentric coordinates.
+    pub p: V3<L>,
+    /// Where light is gathered: the hit point, raised by [`lift`] where the mesh stands for a rounder surface.
+    pub origin: V3<L>,
+    /// Where it is raised.
+    lifted: L::M,
+    pub wo: V3<L>,
+    /// Geometric normal on the viewer's side.
+    pub ng: V3<L>,
+    /// The front side was hit.
+    pub front: L::M,
+    /// Texture coordinates.
+    pub uvs: UvSets<L>,
+    /// Vertex colour; white where there is none.
+    pub color: V3<L>,
+    /// Opacity of the vertex colour.
+    pub opacity: L::F,
+    /// Unit normal of the front: interpolated, or geometric where the mesh has none or one that cannot be used.
+    pub normal: V3<L>,
+    /// Where it is interpolated.
+    pub has_normal: L::M,
+    /// Barycentric coordinates.
+    pub b: [L::F; 2],
+}
+
+/// Geometry of the hits.
+#[inline(always)]
+pub(super) fn interact<L: Lanes>(
+    tables: &SceneTables,
+    pool: &PathPool,
+    at: usize,
+    primitive: L::U,
+    hit: L::M,
+) -> Interaction<L> {
+    let zero = L::F::zero();
+    let none = L::M::from_bits(0);
+    let triangle = tables.triangles.get::<L>(primitive);
+    let b = [L::F::load(&pool.hits.u, at), L::F::load(&pool.hits.v, at)];
+    let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
+    let front = wo.dot(triangle.ng).gt(zero);
+    let ng = triangle.ng.or_else(front, -triangle.ng);
+    let p = triangle.point(b[0], b[1]);
+    let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
+    let (mut color, mut opacity) = (V3::splat([1.0; 3]), L::F::one());
+    let (mut origin, mut lifted) = (p, none);
+    if tables.triangles.has_attributes() {
+        let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
+        if has.any() {
+            let a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
+            uvs = a.uvs.masked(has);
+            if tables.triangles.has_colors() {
+                (color, opacity) = (a.color.or_else(has, color), a.opacity.or_else(has, opacity));
+            }
+            if tables.triangles.has_normals() {
+                let smooth = a.normal.normalized();
+                has_normal = has & a.has_normal & smooth.is_finite();
+                normal = smooth.or_else(has_normal, normal);
+                let height = lift(&triangle, &a.corner_normals, b, front);
+                lifted = has_normal & height.gt(zero);
+                origin = ng.mul_add(height, p).or_else(lifted, p);
+            }
+        }
+    }
+    Interaction { triangle, p, origin, lifted, wo, ng, front, uvs, color, opacity, normal, has_normal, b }
+}
+
+impl<L: Lanes> Interaction<L> {
+    /// A normal of the front turned to the viewer's side.
+    #[inline(always)]
+    pub fn to_viewer(&self, normal: V3<L>) -> V3<L> {
+        normal.or_else(self.front, -normal)
+    }
+
+    /// Where rays leave: off the surface on the viewer's side, since all there is is reflection.
+    #[inline(always)]
+    pub fn start(&self) -> V3<L> {
+        robust::offset_point(self.origin, self.ng, self.triangle.offset_length())
+    }
+
+    /// Whether `wi` leads away from the surface on the viewer's side: from the triangle, or, at a raised origin, from
+    /// the rounder surface that it stands for. (There the ray may still meet the triangle itself.)
+    #[inline(always)]
+    pub fn is_outside(&self, wi: V3<L>) -> L::M {
+        let outside = wi.dot(self.ng).gt(L::F::zero());
+        if !self.lifted.any() {
+            return outside;
+        }
+        outside | (self.lifted & wi.dot(self.to_viewer(self.normal)).gt(L::F::zero()))
+    }
+}
