@@ -78,6 +78,7 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
         ("prt:accel", ExrValue::Text(stats.accel.used.into())),
         ("prt:integrator", ExrValue::Text("path".into())),
         ("prt:brdf", ExrValue::Text(brdf_name(settings.brdf).into())),
+        ("prt:light", ExrValue::Text(light_name(frame).into())),
         ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
         ("prt:truncated", ExrValue::Double(stats.truncated)),
         ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
@@ -89,6 +90,11 @@ fn brdf_name(brdf: Brdf) -> &'static str {
     match brdf {
         Brdf::AppendixB => "appendix-b",
     }
+}
+
+/// Whether there is light beside the file's own.
+fn light_name(frame: &Frame) -> &'static str {
+    if frame.stats.default_light.used { "studio" } else { "file" }
 }
 
 /// What biases the picture and why; `no` if nothing does.
@@ -146,7 +152,7 @@ mod tests {
         let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
         #[rustfmt::skip]
         assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
-            "prt:nonFinite", "prt:truncated", "prt:biased"]);
+            "prt:light", "prt:nonFinite", "prt:truncated", "prt:biased"]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
 mod coverage;
+mod miss;
 mod pool;
 mod shade;
 mod wave;

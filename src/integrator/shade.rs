@@ -1,6 +1,7 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
 use super::coverage::{behind, passes};
+use super::miss::see_environment;
 use super::pool::PathPool;
 use super::wave::Counters;
 use super::{PathTracer, SceneTables};
@@ -79,6 +80,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let slot = L::U::load(&pool.slot, at);
     let primitive = L::U::load(&pool.hits.primitive, at);
     let mut hit = active & !primitive.eq(L::U::splat(MISS));
+    if tables.lights.has_environment() {
+        see_environment::<L>(tables, pool, at, slot, active & !hit);
+    }
     if !hit.any() {
         slot.compress(active, &mut pool.dead, pool.n_dead);
         pool.n_dead += active.count();

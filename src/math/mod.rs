@@ -1,5 +1,7 @@
-//! Vectors over lanes, frames, rounding bounds and ray origins. glam serves everything scalar.
+//! Vectors over lanes, frames, angles, discrete distributions, rounding bounds and ray origins. glam serves everything scalar.
 
+pub mod angle;
+pub mod distribution;
 mod frame;
 pub mod lanes;
 pub mod robust;

@@ -108,10 +108,13 @@ fn render_here(
         features: vec![
             ("emissive_surfaces", tables.lights.has_triangles()),
             ("punctual_lights", !scene.lights.is_empty()),
+            ("environment", tables.lights.has_environment()),
+            ("default_light", prepared.default_light.used),
             ("textures", !scene.textures.is_empty()),
             ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
             ("normal_maps", tables.triangles.has_tangents()),
         ],
+        default_light: prepared.default_light,
         accel: prepared.accel_report,
         lanes: level.lanes(),
         warnings,
