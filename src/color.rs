@@ -66,6 +66,11 @@ pub fn srgb_from_linear(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// The inverse of [`srgb_from_linear`].
+pub fn linear_from_srgb(encoded: f64) -> f64 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,6 +131,14 @@ mod tests {
         let (below, above) = (srgb_from_linear(0.003_130_8), srgb_from_linear(0.003_130_800_001));
         assert!((above - below).abs() < 1e-6);
         assert_eq!(SRGB.apply([0.18; 3]).0, [118; 3]);
+    }
+
+    #[test]
+    fn srgb_is_undone() {
+        for step in 0..=100 {
+            let linear = f64::from(step) / 100.0;
+            assert!((linear_from_srgb(srgb_from_linear(linear)) - linear).abs() < 1e-6, "{linear}");
+        }
     }
 
     #[test]

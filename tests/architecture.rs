@@ -28,6 +28,7 @@ const MAY_USE: [(&str, &[&str]); 18] = [
         &[
             "accel",
             "camera",
+            "color",
             "error",
             "film",
             "integrator",

@@ -60,6 +60,7 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--exposure", "auto", "not built yet"),
         ("--tonemap", "agx", "not built yet"),
         ("--brdf", "full", "not built yet"),
+        ("--default-light", "studio", "auto, on, off"),
         ("--integrator", "ao", "not built yet"),
         ("--exr", "half", "not built yet"),
         ("--exr-compression", "dwaa", "zip, zips, piz, rle, none"),
@@ -95,7 +96,6 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         "--env",
         "--env-rotate",
         "--env-scale",
-        "--default-light",
         "--f-stop",
         "--focus-distance",
         "--focus-on",
@@ -140,6 +140,7 @@ fn help_has_examples_and_version_is_told() {
     let text = String::from_utf8(help.stdout).unwrap();
     assert!(help.status.success() && text.contains("Examples:") && text.contains("--out"), "{text}");
     assert!(!text.contains("--env"), "what is not built is not advertised");
+    assert!(text.contains("--default-light"), "{text}");
     let version = prt_in(folder().path(), &["--version"]);
     assert_eq!(String::from_utf8(version.stdout).unwrap().trim(), concat!("prt-batch ", env!("CARGO_PKG_VERSION")));
 }

@@ -80,6 +80,7 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
         ("prt:brdf", ExrValue::Text(brdf_name(settings.brdf).into())),
         // Part of the shading model (docs/conventions.md, "Shading normals").
         ("prt:normals", ExrValue::Text("repaired, terminator".into())),
+        ("prt:light", ExrValue::Text(light_name(frame).into())),
         ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
         ("prt:truncated", ExrValue::Double(stats.truncated)),
         ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
@@ -91,6 +92,11 @@ fn brdf_name(brdf: Brdf) -> &'static str {
     match brdf {
         Brdf::AppendixB => "appendix-b",
     }
+}
+
+/// Whether there is light beside the file's own.
+fn light_name(frame: &Frame) -> &'static str {
+    if frame.stats.default_light.used { "studio" } else { "file" }
 }
 
 /// What biases the picture and why; `no` if nothing does.
@@ -148,7 +154,7 @@ mod tests {
         let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
         #[rustfmt::skip]
         assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
-            "prt:normals", "prt:nonFinite", "prt:truncated", "prt:biased"]);
+            "prt:normals", "prt:light", "prt:nonFinite", "prt:truncated", "prt:biased"]);
     }
 
     #[test]

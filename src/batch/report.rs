@@ -55,6 +55,7 @@ pub struct ImageReport {
     pub triangles: Option<u64>,
     pub instances: Option<u64>,
     pub lights: Option<u64>,
+    pub default_light: Option<DefaultLight>,
     pub features: BTreeMap<&'static str, bool>,
     pub skipped: Vec<Skipped>,
     pub warnings: Vec<String>,
@@ -83,6 +84,15 @@ pub struct Accel {
     pub used: Option<&'static str>,
     pub version: Option<String>,
     pub isa: Option<String>,
+}
+
+/// The built-in studio light and why it is on or off.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct DefaultLight {
+    pub requested: &'static str,
+    pub used: bool,
+    pub emitted_lm_per_m2: f64,
 }
 
 /// Wall seconds of the image's own work; null where it did not come to that.

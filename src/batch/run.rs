@@ -8,7 +8,7 @@ use super::picture::{FileOptions, exr_bytes, png_bytes};
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Rays, Seconds, Status};
 use super::size::{PictureSize, aspect_note, check_crop, size_for};
 use crate::load::{LoadOptions, LoadTimes, load};
-use crate::render::{AccelChoice, Frame, Progress, RenderSettings, render};
+use crate::render::{AccelChoice, DefaultLight, Frame, Progress, RenderSettings, render};
 use crate::scene::Scene;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -313,6 +313,7 @@ impl Run<'_> {
             triangles: None,
             instances: None,
             lights: None,
+            default_light: None,
             features: Default::default(),
             skipped: Vec::new(),
             warnings: Vec::new(),
@@ -354,6 +355,12 @@ fn describe(frame: &Frame, settings: &RenderSettings, image: &mut ImageReport) {
     image.triangles = Some(stats.triangles);
     image.instances = Some(stats.instances);
     image.lights = Some(stats.lights);
+    image.default_light = Some(report::DefaultLight {
+        requested: default_light_name(stats.default_light.requested),
+        used: stats.default_light.used,
+        emitted_lm_per_m2: stats.default_light.emitted,
+    });
+    image.notes.extend(stats.default_light.note());
     image.features = stats.features.iter().copied().collect();
     image.warnings.extend(stats.warnings.iter().cloned());
     if let Some((x, y, sample)) = stats.non_finite_examples.first() {
@@ -369,6 +376,14 @@ fn accel_name(accel: AccelChoice) -> &'static str {
         AccelChoice::Embree => "embree",
         AccelChoice::Bvh => "bvh",
         AccelChoice::Linear => "linear",
+    }
+}
+
+fn default_light_name(choice: DefaultLight) -> &'static str {
+    match choice {
+        DefaultLight::Auto => "auto",
+        DefaultLight::On => "on",
+        DefaultLight::Off => "off",
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod coverage;
 mod interaction;
+mod miss;
 mod normals;
 mod pool;
 mod shade;

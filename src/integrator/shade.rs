@@ -2,6 +2,7 @@
 
 use super::coverage::{behind, passes};
 use super::interaction::{Interaction, interact};
+use super::miss::see_environment;
 use super::normals::shading_normal;
 use super::pool::PathPool;
 use super::wave::Counters;
@@ -54,6 +55,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let slot = L::U::load(&pool.slot, at);
     let primitive = L::U::load(&pool.hits.primitive, at);
     let mut hit = active & !primitive.eq(L::U::splat(MISS));
+    if tables.lights.has_environment() {
+        see_environment::<L>(tables, pool, at, slot, active & !hit);
+    }
     if !hit.any() {
         slot.compress(active, &mut pool.dead, pool.n_dead);
         pool.n_dead += active.count();

@@ -1,6 +1,20 @@
-//! Punctual lights (`KHR_lights_punctual`). Emissive surfaces are materials.
+//! Punctual lights (`KHR_lights_punctual`) and environments. Emissive surfaces are materials.
 
+pub mod environment;
+pub mod studio;
 pub mod table;
+
+/// Light from all around, infinitely far away: an equirectangular map in world axes.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    /// Texels across, >= 1.
+    pub width: u32,
+    /// Texels down, >= 1.
+    pub height: u32,
+    /// `[height * width]` linear Rec.709 radiance, nits, finite and >= 0; row 0 is +Y, the centre column +X, and columns
+    /// go on towards +Z. Bilinear between texel centres.
+    pub radiance: Vec<[f32; 3]>,
+}
 
 /// A light without size. It shines along the local -Z axis where it has a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]

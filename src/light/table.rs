@@ -1,10 +1,11 @@
 //! Choosing a light and a point on it, for next event estimation.
 //!
-//! Emissive triangles and punctual lights share one list; one is chosen with probability proportional to its power,
+//! Emissive triangles, punctual lights and the environment share one list; one is chosen with probability proportional to its power,
 //! by inverting the distribution function (not an alias table, which would undo the stratification of the number).
 
+use super::environment::EnvironmentTable;
 use crate::material::table::MaterialTable;
-use crate::math::{UvSets, V3, robust};
+use crate::math::{UvSets, V3, distribution, robust};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use simd::{Float, Lanes, Mask, Uint};
@@ -14,6 +15,7 @@ const TRIANGLE: u32 = 0;
 const POINT: u32 = 1;
 const SPOT: u32 = 2;
 const DIRECTIONAL: u32 = 3;
+const ENVIRONMENT: u32 = 4;
 
 /// A light in the prepared scene's space.
 #[derive(Clone, Copy, Debug)]
@@ -64,10 +66,12 @@ pub enum PreparedLight {
 #[derive(Clone, Debug, Default)]
 pub struct LightTable {
     records: Vec<[f32; 4]>,
-    /// Upper ends of the lights' shares of [0, 1), padded with 2 to a power of two.
+    /// Upper ends of the lights' shares of [0, 1).
     distribution: Vec<f32>,
     has_triangles: bool,
     has_punctual: bool,
+    /// With its selection probability; chosen as the last light of the list.
+    environment: Option<(EnvironmentTable, f32)>,
 }
 
 /// A point on a light seen from a shading point.
@@ -91,20 +95,26 @@ pub struct LightSample<L: Lanes> {
 impl LightTable {
     /// Lights with their powers (any common unit); those without power must not be in the list. Also sets the light
     /// density of emissive triangles in `triangles`.
-    pub fn new(lights: &[(PreparedLight, f64)], triangles: &mut TriangleTable) -> Self {
-        let total: f64 = lights.iter().map(|l| l.1).sum();
+    pub fn new(
+        lights: &[(PreparedLight, f64)],
+        environment: Option<(EnvironmentTable, f64)>,
+        triangles: &mut TriangleTable,
+    ) -> Self {
+        let mut powers: Vec<f64> = lights.iter().map(|l| l.1).collect();
+        powers.extend(environment.as_ref().map(|e| e.1));
+        let total: f64 = powers.iter().sum();
         let mut table = Self::default();
-        let mut sum = 0.0;
         for (light, power) in lights {
-            let pmf = power / total;
-            sum += pmf;
-            table.distribution.push(sum as f32);
-            table.push(light, pmf, triangles);
+            table.push(light, power / total, triangles);
         }
-        if let Some(last) = table.distribution.last_mut() {
-            *last = 2.0;
+        if let Some((environment, power)) = environment {
+            let pmf = (power / total) as f32;
+            let mut first = [[0.0; 4]; RECORDS as usize];
+            first[0][3] = f32::from_bits(ENVIRONMENT);
+            table.records.extend(first);
+            table.environment = Some((environment, pmf));
         }
-        table.distribution.resize(lights.len().next_power_of_two(), 2.0);
+        distribution::push_ends(&powers, &mut table.distribution);
         table
     }
 
@@ -171,17 +181,24 @@ impl LightTable {
         self.has_triangles
     }
 
+    /// There is light from all around.
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
+    /// What comes from infinitely far along the unit direction `d`: radiance (nits) and the density (1/sr, selection pmf
+    /// included) with which [`Self::sample`] would have chosen it. Nothing without an environment.
+    #[inline(always)]
+    pub fn environment<L: Lanes>(&self, d: V3<L>) -> (V3<L>, L::F) {
+        let Some((environment, pmf)) = &self.environment else { return (V3::zero(), L::F::zero()) };
+        let (radiance, pdf) = environment.lookup::<L>(d);
+        (radiance, pdf * L::F::splat(*pmf))
+    }
+
     /// The index of the light whose share of [0, 1) holds `u`; no work for a single light.
     #[inline(always)]
     fn choose<L: Lanes>(&self, u: L::F) -> L::U {
-        let mut at = L::U::splat(0);
-        let mut step = self.distribution.len() as u32 / 2;
-        while step > 0 {
-            let end = (at + L::U::splat(step - 1)).gather(&self.distribution);
-            at = (at + L::U::splat(step)).or_else(u.ge(end), at);
-            step /= 2;
-        }
-        at
+        distribution::find::<L>(&self.distribution, L::U::splat(0), self.distribution.len() as u32, u)
     }
 
     /// A light and a point on it, as seen from `p`, by `u` = (choice, point, point). The table must not be empty.
@@ -202,15 +219,49 @@ impl LightTable {
             (at + L::U::splat(3)).records(&self.records),
         ];
         let kind = record[0][3].to_bits();
+        let Some((environment, pmf)) = &self.environment else {
+            return self.sample_near(p, u, at, &record, kind, triangles, materials, textures);
+        };
+        let far = kind.eq(L::U::splat(ENVIRONMENT));
+        let sky = sample_environment(environment, *pmf, [u[1], u[2]]);
+        if !self.has_triangles && !self.has_punctual {
+            return sky;
+        }
+        let near = self.sample_near(p, u, at, &record, kind, triangles, materials, textures);
+        LightSample {
+            radiance: sky.radiance.or_else(far, near.radiance),
+            wi: sky.wi.or_else(far, near.wi),
+            pdf: sky.pdf.or_else(far, near.pdf),
+            is_delta: near.is_delta & !far,
+            end: sky.end.or_else(far, near.end),
+            is_distant: near.is_distant | far,
+            valid: (sky.valid & far) | (near.valid & !far),
+        }
+    }
+
+    /// The lights other than the environment.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "tables are passed apart so that light does not know the integrator")]
+    fn sample_near<L: Lanes>(
+        &self,
+        p: V3<L>,
+        u: [L::F; 3],
+        at: L::U,
+        record: &[[L::F; 4]; 4],
+        kind: L::U,
+        triangles: &TriangleTable,
+        materials: &MaterialTable,
+        textures: &TextureTable,
+    ) -> LightSample<L> {
         let on_triangle = kind.eq(L::U::splat(TRIANGLE));
         if !self.has_punctual {
-            return self.sample_triangle(p, u, at, &record, triangles, materials, textures);
+            return self.sample_triangle(p, u, at, record, triangles, materials, textures);
         }
-        let punctual = sample_punctual(p, &record, kind);
+        let punctual = sample_punctual(p, record, kind);
         if !self.has_triangles || !on_triangle.any() {
             return punctual;
         }
-        let area = self.sample_triangle(p, u, at, &record, triangles, materials, textures);
+        let area = self.sample_triangle(p, u, at, record, triangles, materials, textures);
         LightSample {
             radiance: area.radiance.or_else(on_triangle, punctual.radiance),
             wi: area.wi.or_else(on_triangle, punctual.wi),
@@ -278,6 +329,22 @@ impl LightTable {
             is_distant: L::M::from_bits(0),
             valid: finite & radiance.max_component().gt(L::F::zero()),
         }
+    }
+}
+
+/// A direction of the environment.
+#[inline(always)]
+fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: f32, u: [L::F; 2]) -> LightSample<L> {
+    let sample = environment.sample::<L>(u);
+    let pdf = sample.pdf * L::F::splat(pmf);
+    LightSample {
+        radiance: sample.radiance,
+        wi: sample.direction,
+        pdf,
+        is_delta: L::M::from_bits(0),
+        end: sample.direction,
+        is_distant: L::M::first(L::N),
+        valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
     }
 }
 

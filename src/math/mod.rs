@@ -1,6 +1,9 @@
-//! Vectors over lanes, frames, shading normals kept usable, rounding bounds and ray origins. glam serves everything scalar.
+//! Vectors over lanes, frames, angles, discrete distributions, shading normals kept usable, rounding bounds and ray
+//! origins. glam serves everything scalar.
 
+pub mod angle;
 pub mod bend;
+pub mod distribution;
 mod frame;
 pub mod lanes;
 pub mod robust;

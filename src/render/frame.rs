@@ -108,6 +108,8 @@ fn render_here(
         features: vec![
             ("emissive_surfaces", tables.lights.has_triangles()),
             ("punctual_lights", !scene.lights.is_empty()),
+            ("environment", tables.lights.has_environment()),
+            ("default_light", prepared.default_light.used),
             ("textures", !scene.textures.is_empty()),
             ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
             ("normal_maps", tables.triangles.has_tangents()),
@@ -115,6 +117,7 @@ fn render_here(
             ("unlit", tables.materials.has_unlit()),
             ("vertex_colors", tables.triangles.has_colors()),
         ],
+        default_light: prepared.default_light,
         accel: prepared.accel_report,
         lanes: level.lanes(),
         warnings,

@@ -1,13 +1,16 @@
 //! From a scene and settings to a [`Frame`].
 
+mod default_light;
+mod emission;
 mod frame;
 mod prepare;
 mod schedule;
 mod settings;
 
+pub use default_light::{DefaultLightReport, LEAST_EMITTED};
 pub use frame::render;
 pub use prepare::{Prepared, prepare};
-pub use settings::{AccelChoice, Brdf, CropWindow, Filter, RenderSettings};
+pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
 
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
@@ -75,10 +78,12 @@ pub struct RenderStats {
     pub triangles: u64,
     /// Placed meshes.
     pub instances: u64,
-    /// Lights: punctual ones and emissive triangles.
+    /// Lights: punctual ones, emissive triangles and the environment.
     pub lights: u64,
     /// Named yes/no facts about the scene, as in `features` of the JSON.
     pub features: Vec<(&'static str, bool)>,
+    /// Whether the built-in studio lights the scene, and why.
+    pub default_light: DefaultLightReport,
     /// Which backend and why.
     pub accel: AccelReport,
     /// SIMD lanes that shaded: 1, 8 or 16.

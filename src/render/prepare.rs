@@ -1,12 +1,15 @@
 //! The seam: a scene's description becomes machinery. Everything conditional is decided here, once.
 
+use super::default_light::{DefaultLightReport, SurfaceTotals};
+use super::emission::mean_emissions;
 use super::{AccelChoice, AccelReport, RenderSettings};
 use crate::accel::front::{Front, Split};
 use crate::accel::{Accel, AccelStats, Triangles, embree::EmbreeAccel, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::SceneTables;
-use crate::light::Light;
+use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
+use crate::light::{Light, studio};
 use crate::material::table::MaterialTable;
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
@@ -27,15 +30,18 @@ pub struct Prepared {
     pub origin: DVec3,
     /// Bounds in world space; `None` without triangles.
     pub bounds: Option<(DVec3, DVec3)>,
+    /// Whether the built-in studio lights the scene, and why.
+    pub default_light: DefaultLightReport,
     /// Said to the user.
     pub warnings: Vec<String>,
 }
 
-/// Triangles that flattening had to mend.
+/// What is counted while instances are flattened.
 #[derive(Default)]
-struct Mended {
-    /// Left out: without area once placed.
+struct Totals {
+    /// Triangles left out because flattening made them unusable.
     without_area: usize,
+    surface: SurfaceTotals,
     /// Their vertex normals all pointed to the back, and were turned round.
     turned_normals: usize,
 }
@@ -57,32 +63,54 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     let mut triangles = TriangleTable::with_capacity(count);
     let mut geometry = Triangles::default();
     let mut lights = Vec::new();
-    let mut mended = Mended::default();
+    let emissions = mean_emissions(scene);
+    let mut totals = Totals::default();
     for instance in &scene.instances {
-        flatten(scene, instance, origin, &mut geometry, &mut triangles, &mut lights, &mut mended);
+        flatten(scene, instance, origin, &emissions, &mut geometry, &mut triangles, &mut lights, &mut totals);
     }
     let mut warnings = Vec::new();
-    if mended.without_area > 0 {
-        warnings.push(format!("{} triangles have no area once placed and were dropped", mended.without_area));
+    if totals.without_area > 0 {
+        warnings.push(format!("{} triangles have no area once placed and were dropped", totals.without_area));
     }
-    if mended.turned_normals > 0 {
+    if totals.turned_normals > 0 {
         warnings.push(format!(
             "{} triangles have vertex normals that point to their back; they were turned to the front, which is \
              counter-clockwise",
-            mended.turned_normals
+            totals.turned_normals
         ));
     }
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
     punctual(scene, origin, radius, &mut lights);
-    if lights.is_empty() {
-        warnings.push(String::from(
-            "nothing in the scene emits light, so the picture is black; add a light or an emissive material",
-        ));
+    let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
+    let environment = environment(scene, default_light.used, radius, &lights);
+    if lights.is_empty() && environment.is_none() {
+        warnings.push(default_light.darkness(scene));
     }
-    let lights = LightTable::new(&lights, &mut triangles);
+    let lights = LightTable::new(&lights, environment, &mut triangles);
     let (accel, accel_report) = build_accel(geometry, settings)?;
     let tables = SceneTables { triangles, materials, textures, lights };
-    Ok(Prepared { tables, accel, accel_report, origin, bounds, warnings })
+    Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings })
+}
+
+/// Most that the environment takes of the light samples where there are other lights: scattered rays find it by
+/// themselves, other lights need the samples.
+const ENVIRONMENT_SHARE: f64 = 0.5;
+
+/// The environment with the weight of its choice: its power through the scene's bounding sphere, limited.
+fn environment(
+    scene: &Scene,
+    studio: bool,
+    radius: f64,
+    others: &[(PreparedLight, f64)],
+) -> Option<(EnvironmentTable, f64)> {
+    let own = scene.environment.as_ref().and_then(EnvironmentTable::new);
+    let table = own.or_else(|| studio.then(studio::environment).as_ref().and_then(EnvironmentTable::new))?;
+    let power = 4.0 * (std::f64::consts::PI * radius).powi(2) * table.mean_radiance();
+    let others: f64 = others.iter().map(|l| l.1).sum();
+    let most = others * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE);
+    // Alone it is certain, whatever its power; a scene of a single point has no sphere.
+    let weight = if others > 0.0 { power.min(most) } else { 1.0 };
+    Some((table, weight))
 }
 
 /// World bounds of everything placed.
@@ -102,14 +130,16 @@ fn bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
 }
 
 /// Appends one instance in world space, recentred, vertices transformed in f64 and rounded once.
+#[expect(clippy::too_many_arguments, reason = "what is read, then the four tables that grow")]
 fn flatten(
     scene: &Scene,
     instance: &Instance,
     origin: DVec3,
+    emissions: &[[f64; 3]],
     geometry: &mut Triangles,
     table: &mut TriangleTable,
     lights: &mut Vec<(PreparedLight, f64)>,
-    mended: &mut Mended,
+    totals: &mut Totals,
 ) {
     let mesh = &scene.meshes[instance.mesh.index()];
     let material = scene.materials.get(mesh.material.index());
@@ -123,7 +153,11 @@ fn flatten(
         let p = instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
         (p - origin).as_vec3().to_array()
     }));
-    let average = material.map_or(0.0, |m| mean_emission(scene, m));
+    let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
+    // Mean over channels: what its share of the light samples follows.
+    let average = emission.iter().sum::<f64>() / 3.0;
+    let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
+    let mut mesh_area = 0.0;
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
         let [j, k] = if mirrors { [k, j] } else { [j, k] };
@@ -134,9 +168,10 @@ fn flatten(
         let cross = (edges[1] - edges[0]).cross(edges[2] - edges[0]);
         let area = 0.5 * cross.length();
         if area == 0.0 || !area.is_finite() {
-            mended.without_area += 1;
+            totals.without_area += 1;
             continue;
         }
+        mesh_area += area;
         let ng = (cross / (2.0 * area)).as_vec3();
         let mut normals = mesh.normals.as_ref().map(|n| {
             [i, j, k].map(|v| {
@@ -147,7 +182,7 @@ fn flatten(
         // As pbrt does: normals against the winding would light the triangle from behind.
         let turns = normals.is_some_and(|n| n.iter().all(|n| n.dot(ng) < 0.0));
         if turns {
-            mended.turned_normals += 1;
+            totals.turned_normals += 1;
             normals = normals.map(|n| n.map(|n| -n));
         }
         let attributes = if needs_attributes { push_attributes(mesh, [i, j, k], normals, table) } else { NONE };
@@ -163,12 +198,12 @@ fn flatten(
         geometry.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
         if average > 0.0 {
-            let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
             let power = average * area * sides * std::f64::consts::PI;
             let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
             lights.push((light, power));
         }
     }
+    totals.surface.add(mesh_area, emission, sides);
 }
 
 /// Attributes of a triangle's corners.
@@ -181,28 +216,6 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
 /// Matrix of cofactors: the inverse transpose times the determinant.
 fn cofactor(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
-}
-
-/// Mean over channels and texture of a material's emission, nits: what its share of the light samples follows. Positive
-/// wherever it emits at all.
-fn mean_emission(scene: &Scene, material: &crate::material::Material) -> f64 {
-    if material.unlit {
-        return 0.0;
-    }
-    let factor = material.emission.factor.map(f64::from);
-    let Some(texture) = material.emission.texture else {
-        return factor.iter().sum::<f64>() / 3.0;
-    };
-    let image = &scene.images[scene.textures[texture.texture.index()].image.index()];
-    let mut sums = [0.0; 3];
-    for i in 0..image.texels.len() {
-        for (sum, value) in sums.iter_mut().zip(image.texels.get(i)) {
-            // The square is near enough to the sRGB curve for a sampling weight.
-            *sum += f64::from(value).powi(2);
-        }
-    }
-    let n = image.texels.len().max(1) as f64;
-    sums.iter().zip(factor).map(|(s, f)| s / n * f).sum::<f64>() / 3.0
 }
 
 /// Adds the punctual lights that shine at all.

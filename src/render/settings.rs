@@ -16,6 +16,18 @@ pub enum AccelChoice {
     Linear,
 }
 
+/// When the built-in studio lights a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DefaultLight {
+    /// Where the scene has no light of its own and hardly emits any.
+    #[default]
+    Auto,
+    /// Beside whatever lights there are.
+    On,
+    /// Never.
+    Off,
+}
+
 /// Which microfacet model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Brdf {
@@ -79,6 +91,8 @@ pub struct RenderSettings {
     pub filter: Filter,
     /// Microfacet model.
     pub brdf: Brdf,
+    /// Built-in studio light.
+    pub default_light: DefaultLight,
     /// Ray backend.
     pub accel: AccelChoice,
     /// Folders in which libembree4 is looked for, after `EMBREE_DIR` and before the system's.
@@ -106,6 +120,7 @@ impl Default for RenderSettings {
             max_bounces: None,
             filter: Filter::default(),
             brdf: Brdf::default(),
+            default_light: DefaultLight::default(),
             accel: AccelChoice::default(),
             embree_dirs: Vec::new(),
             threads: None,

@@ -2,6 +2,7 @@
 
 use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, TextureId};
 use crate::camera::Camera;
+use crate::light::Environment;
 use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Image, Texture};
@@ -46,6 +47,12 @@ impl SceneBuilder {
     /// Places a light.
     pub fn add_light(&mut self, light: PlacedLight) {
         self.scene.lights.push(light);
+    }
+
+    /// Lights the scene from all around; the last environment counts. Texels that are not finite or negative become 0,
+    /// with a warning.
+    pub fn set_environment(&mut self, environment: Environment) {
+        self.scene.environment = Some(environment);
     }
 
     /// Adds a camera.

@@ -30,6 +30,19 @@ pub(super) fn check(scene: &mut Scene) {
     unusable.warn(scene, "triangles dropped: a vertex is not finite or is beyond 1.844e18");
     flat.warn(scene, "triangles dropped: without area");
     uvs.warn(scene, "texture coordinates that are not finite: taken as 0");
+    clean_environment(scene);
+}
+
+/// Texels that are no radiance become black, with a counted warning.
+fn clean_environment(scene: &mut Scene) {
+    let Some(environment) = &mut scene.environment else { return };
+    let size = environment.width as usize * environment.height as usize;
+    assert!(size > 0 && environment.radiance.len() == size, "an environment has width x height texels");
+    let bad = |texel: &&mut [f32; 3]| !texel.iter().all(|c| c.is_finite() && *c >= 0.0);
+    let count = environment.radiance.iter_mut().filter(bad).map(|texel| *texel = [0.0; 3]).count();
+    if count > 0 {
+        scene.warnings.push(format!("{count} texels of the environment are negative or not finite: taken as black"));
+    }
 }
 
 fn check_ids(scene: &Scene) {
@@ -175,6 +188,16 @@ mod tests {
         check(&mut scene);
         assert_eq!(scene.meshes[0].uv_sets, [[[0.0, 0.0], [1.0, 2.0], [0.0, 0.0]]]);
         assert!(scene.warnings[0].starts_with("2 texture coordinates"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn texels_that_are_no_radiance_become_black() {
+        let radiance = vec![[1.0; 3], [-1.0, 2.0, 3.0], [f32::NAN; 3], [f32::INFINITY, 0.0, 0.0]];
+        let environment = Some(crate::light::Environment { width: 2, height: 2, radiance });
+        let mut scene = Scene { environment, ..Scene::default() };
+        check(&mut scene);
+        assert_eq!(scene.environment.unwrap().radiance, [[1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+        assert!(scene.warnings[0].starts_with("3 texels of the environment"), "{:?}", scene.warnings);
     }
 
     #[test]

@@ -8,7 +8,7 @@ pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
 pub use builder::SceneBuilder;
 
 use crate::camera::Camera;
-use crate::light::Light;
+use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Image, Texture};
@@ -60,6 +60,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Punctual lights.
     pub lights: Vec<PlacedLight>,
+    /// Light from all around, in world axes.
+    pub environment: Option<Environment>,
     /// Cameras with their place.
     pub cameras: Vec<Camera>,
     /// Which scene of the file this is.

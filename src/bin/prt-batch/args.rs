@@ -5,7 +5,7 @@ use clap::{Args, Parser, Subcommand};
 use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::ToneCurve;
 use prt::image::exr::ExrCompression;
-use prt::render::{AccelChoice, Brdf, CropWindow, Filter};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -89,6 +89,10 @@ pub struct RenderArgs {
     /// Ray backend: auto, embree, bvh or linear (brute force, for tests)
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = parse::accel)]
     pub accel: AccelChoice,
+
+    /// Built-in studio light: auto (where the file has no light and hardly emits any), on or off
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light)]
+    pub default_light: DefaultLight,
 
     /// Exposure of the PNG in stops
     #[arg(long, value_name = "EV", default_value = "0", value_parser = parse::exposure, allow_hyphen_values = true)]

@@ -3,7 +3,7 @@
 use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::ToneCurve;
 use prt::image::exr::ExrCompression;
-use prt::render::{AccelChoice, Brdf, CropWindow, Filter};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::str::FromStr;
 
 /// Most pixels along one side.
@@ -97,6 +97,11 @@ pub fn filter(value: &str) -> Result<Filter, String> {
 pub fn accel(value: &str) -> Result<AccelChoice, String> {
     use AccelChoice::{Auto, Bvh, Embree, Linear};
     word(value, &[("auto", Auto), ("embree", Embree), ("bvh", Bvh), ("linear", Linear)], &[])
+}
+
+pub fn default_light(value: &str) -> Result<DefaultLight, String> {
+    use DefaultLight::{Auto, Off, On};
+    word(value, &[("auto", Auto), ("on", On), ("off", Off)], &[])
 }
 
 pub fn brdf(value: &str) -> Result<Brdf, String> {

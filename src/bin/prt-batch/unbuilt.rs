@@ -21,7 +21,6 @@ const OPTIONS: &[(&str, bool)] = &[
     ("env", true),
     ("env-rotate", true),
     ("env-scale", true),
-    ("default-light", true),
     ("f-stop", true),
     ("focus-distance", true),
     ("focus-on", true),
