@@ -1,11 +1,13 @@
 //! From a scene and settings to a [`Frame`].
 
 mod frame;
+mod framing;
 mod prepare;
 mod schedule;
 mod settings;
 
 pub use frame::render;
+pub use framing::FRAMING_YFOV;
 pub use prepare::{Prepared, prepare};
 pub use settings::{AccelChoice, Brdf, CropWindow, Filter, RenderSettings};
 
