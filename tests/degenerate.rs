@@ -124,10 +124,13 @@ fn geo_05_slivers_and_tiny_triangles_have_unit_normals_and_finite_densities() {
         let end = at + along;
         bad.push([at, end, Vec3::new(end.x.next_up(), end.y, end.z)].map(|p| p.to_array()));
     }
-    let mut scene = scene_of(&mesh_of(&mixed(&valid(2000, &mut rng), &bad, 1)), lamp(), &[DMat4::IDENTITY]);
+    // Bounds about the origin, so that recentring leaves the tiny ones their digits.
+    bad.extend([-2.0, 2.0].map(|s| [[s, s, s], [0.0, s, s], [s, 0.0, s]]));
+    let mut scene = scene_of(&mesh_of(&mixed(&valid(bad.len(), &mut rng), &bad, 1)), lamp(), &[DMat4::IDENTITY]);
     let ready = prepared(&scene);
     let n = ready.tables.triangles.len() as u32;
-    assert!(n > 3000, "{n}");
+    // What is left out is on a line: a third corner moved along it.
+    assert!(n > 3900, "{n} of 4004 are left: {:?}", ready.warnings);
     for seen in read(&ready, &(0..n).map(|i| (i, 0.3, 0.3)).collect::<Vec<_>>()) {
         assert!((seen.ng.length() - 1.0).abs() < 1e-6 && seen.point.is_finite(), "{seen:?}");
         assert!(seen.light_density.is_finite() && seen.offset.is_finite() && seen.offset >= 0.0, "{seen:?}");
@@ -184,7 +187,7 @@ fn geo_06_what_a_node_moves_out_of_range_is_dropped_with_a_count_and_spoils_noth
     for far in [
         DMat4::from_translation(DVec3::X * 1e30),
         DMat4::from_scale(DVec3::splat(1e25)),
-        DMat4::from_scale(DVec3::splat(1e300)) * DMat4::from_translation(DVec3::X * 1e20),
+        DMat4::from_scale(DVec3::splat(1e300)),
     ] {
         let mut clean = scene_of(&mesh, lamp(), &[near]);
         let mut dirty = scene_of(&mesh, lamp(), &[near, far]);

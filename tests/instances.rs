@@ -68,6 +68,7 @@ fn baked(mesh: &Mesh, world_from_object: DMat4) -> Mesh {
 fn transforms() -> Vec<(&'static str, DMat4)> {
     let turn = DQuat::from_rotation_y(0.8) * DQuat::from_rotation_x(-0.4);
     let trs = |s: DVec3, turn: DQuat| DMat4::from_scale_rotation_translation(s, turn, DVec3::new(1.5, -2.0, 0.75));
+    let moved = DMat4::from_translation(DVec3::new(-0.7, 0.3, 2.1));
     let scale = |x, y, z| DMat4::from_scale(DVec3::new(x, y, z));
     let level = |k: f64| {
         let s = DVec3::new(1.0 + 0.1 * k, 0.9, 1.1 - 0.3 * k);
@@ -85,7 +86,7 @@ fn transforms() -> Vec<(&'static str, DMat4)> {
         ("mirrored in x and y", trs(DVec3::new(-1.0, -2.0, 1.0), turn)),
         ("mirrored in x, y and z", trs(DVec3::new(-1.0, -2.0, -0.5), turn)),
         ("sheared by its parents", scale(1.0, 3.0, 0.5) * DMat4::from_quat(turn) * scale(2.0, 0.4, 1.0)),
-        ("sheared and mirrored", scale(1.0, -3.0, 0.5) * DMat4::from_quat(turn) * scale(2.0, 0.4, 1.0)),
+        ("sheared, mirrored and moved", moved * scale(1.0, -3.0, 0.5) * DMat4::from_quat(turn) * scale(2.0, 0.4, 1.0)),
         ("nearly singular (1, 1, 1e-6)", scale(1.0, 1.0, 1e-6)),
         ("five levels", (1..=5).map(|k| level(0.2 * f64::from(k))).product()),
     ]
@@ -124,13 +125,15 @@ struct Differences {
     neighbours: usize,
     /// Distance of one's point from the other's plane over the error bound.
     off_plane: f64,
+    /// Distance of the points at the same place of the same triangle over the error bound.
+    position: f64,
     /// Angle between the geometric normals of one triangle, radians.
     ng: f64,
-    /// Angle between the shading normals, radians.
+    /// Angle between the shading normals at the same place, radians.
     ns: f64,
     /// Front for one and back for the other.
     sides: usize,
-    /// Normals that do not point outwards.
+    /// Geometric normals that do not point outwards. (Shading normals may: a facet of a squashed dent. INST-02 has theirs.)
     inwards: usize,
     both: usize,
 }
@@ -147,7 +150,14 @@ fn differences(a: &Prepared, b: &Prepared, mesh: &Mesh, placed: DMat4, rays: &[(
         let world = (seen.point + at.origin).abs().max_element();
         seen.offset + f64::from(gamma(2)) * world
     };
-    for ((x, y), (_, d)) in trace(a, rays).into_iter().zip(trace(b, rays)).zip(rays) {
+    let hits_of_a = trace(a, rays);
+    let places: Vec<_> = hits_of_a.iter().flatten().map(|x| (x.primitive, x.u, x.v)).collect();
+    for (x, y) in hits_of_a.iter().flatten().zip(read(b, &places)) {
+        let apart = (x.point + a.origin) - (y.point + b.origin);
+        found.position = found.position.max(apart.abs().max_element() / (bound(x, a) + bound(&y, b)));
+        found.ns = found.ns.max(angle(x.ns, y.ns));
+    }
+    for ((x, y), (_, d)) in hits_of_a.into_iter().zip(trace(b, rays)).zip(rays) {
         let (Some(x), Some(y)) = (&x, &y) else {
             found.hits += usize::from(x.is_some() != y.is_some());
             continue;
@@ -157,20 +167,19 @@ fn differences(a: &Prepared, b: &Prepared, mesh: &Mesh, placed: DMat4, rays: &[(
         if x.primitive == y.primitive {
             found.off_plane = found.off_plane.max(apart.dot(y.ng).abs() / (bound(x, a) + bound(y, b)));
             found.ng = found.ng.max(angle(x.ng, y.ng));
-            found.ns = found.ns.max(angle(x.ns, y.ns));
             found.sides += usize::from((d.dot(x.ng) < 0.0) != (d.dot(y.ng) < 0.0));
         } else {
             found.neighbours += 1;
         }
         for (seen, n) in [(x, outwards(x.primitive)), (y, outwards(y.primitive))] {
-            found.inwards += usize::from(seen.ng.dot(n) <= 0.0 || seen.ns.dot(n) <= 0.0);
+            found.inwards += usize::from(seen.ng.dot(n) <= 0.0);
             found.sides += usize::from((d.dot(seen.ng) < 0.0) != (d.dot(n) < 0.0) && angle(*d, n) - 0.5 * PI > 1e-5);
         }
     }
     found
 }
 
-// 1e5 rays a transform from seed 1; the limits are the plan's. Measured: see the assertion's figures in its message.
+// 1e5 rays a transform from seed 1; the limits are the plan's.
 #[test]
 fn inst_01_an_instance_is_its_baked_mesh() {
     let mesh = dented_sphere();
@@ -185,7 +194,10 @@ fn inst_01_an_instance_is_its_baked_mesh() {
         assert!(found.both > RAYS / 2, "{name}: {found:?}");
         // 1e-5 of the rays.
         assert!(found.hits <= RAYS / 100_000 && found.neighbours <= RAYS / 10_000, "{name}: {found:?}");
-        assert!(found.off_plane <= 1.0 && found.ng <= 1e-5 && found.ns <= 1e-5, "{name}: {found:?}");
+        assert!(
+            found.off_plane <= 1.0 && found.position <= 1.0 && found.ng <= 1e-5 && found.ns <= 1e-5,
+            "{name}: {found:?}"
+        );
         assert_eq!((found.sides, found.inwards), (0, 0), "{name}: {found:?}");
     }
 }
@@ -220,7 +232,7 @@ fn triangles(placed: &[DMat3], rng: &mut Rng) -> Scene {
 fn inst_02_normals_go_by_the_inverse_transpose_at_every_condition_and_scale() {
     let mut rng = Rng::new(2);
     for scale in [1.0, 1e-20, 1e-13, 1e13] {
-        for cond in [1.0, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6] {
+        for cond in [1.0_f64, 10.0, 1e2, 1e3, 1e4, 1e5, 1e6] {
             let placed: Vec<DMat3> = (0..1000)
                 .map(|_| {
                     let middle = f64::from(rng.unit());

@@ -54,6 +54,10 @@ pub fn prepared(scene: &Scene) -> Prepared {
 #[derive(Clone, Debug)]
 pub struct Seen {
     pub primitive: u32,
+    /// Barycentric weight of the second corner.
+    pub u: f32,
+    /// Barycentric weight of the third corner.
+    pub v: f32,
     pub point: DVec3,
     /// Unit geometric normal.
     pub ng: DVec3,
@@ -84,12 +88,15 @@ pub fn read(prepared: &Prepared, points: &[(u32, f32, f32)]) -> Vec<Seen> {
                 .iter()
                 .map(|&(primitive, u, v)| {
                     let triangle = table.get::<L>(L::U::splat(primitive));
+                    let at = (u, v);
                     let (u, v) = (L::F::splat(u), L::F::splat(v));
                     let ng = vector(triangle.ng);
                     let normal =
                         table.has_attributes().then(|| vector(table.attributes::<L>(triangle.attributes, u, v).normal));
                     Seen {
                         primitive,
+                        u: at.0,
+                        v: at.1,
                         point: vector(triangle.point(u, v)),
                         ng,
                         ns: normal.map_or(ng, DVec3::normalize_or_zero),
