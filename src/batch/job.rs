@@ -86,7 +86,8 @@ pub struct Plan {
     pub owners: HashMap<PathBuf, usize>,
 }
 
-/// Names for the outputs of all `inputs`.
+/// Names for the outputs of all `inputs`; `elsewhere` has the names of the cameras that all of them are to be seen by,
+/// if not by their own.
 ///
 /// # Errors
 /// Two images would write one file, or a name is reserved: says which, and the `--name` that would tell them apart.
@@ -95,11 +96,13 @@ pub fn plan(
     template: Option<&NameTemplate>,
     cameras: &CameraChoice,
     scene: Option<&str>,
+    elsewhere: Option<&[String]>,
 ) -> Result<Plan, String> {
     let names: Vec<Vec<String>> = (inputs.iter())
-        .map(|input| match input.problem {
-            Some(_) => Vec::new(),
-            None => peek::camera_names(&input.path, scene).unwrap_or_default(),
+        .map(|input| match (&input.problem, elsewhere) {
+            (Some(_), _) => Vec::new(),
+            (None, Some(names)) => names.to_vec(),
+            (None, None) => peek::camera_names(&input.path, scene).unwrap_or_default(),
         })
         .collect();
     try_plan(inputs, template, cameras, &names).map_err(|clash| {
@@ -218,7 +221,7 @@ mod tests {
     fn clashes_and_reserved_names_are_refused_with_a_name_that_works() {
         let refused = |paths: &[&str]| {
             let inputs: Vec<_> = paths.iter().map(|p| input(p)).collect();
-            plan(&inputs, None, &CameraChoice::All, None).unwrap_err()
+            plan(&inputs, None, &CameraChoice::All, None, None).unwrap_err()
         };
         let clash = refused(&["s/a.gltf", "t/a.gltf"]);
         assert!(clash.contains("s/a.gltf and t/a.gltf would both") && clash.contains("--name '{parent}-{stem}'"));

@@ -12,7 +12,9 @@ mod picture;
 pub mod report;
 mod run;
 mod size;
+mod view;
 
 pub use picture::FileOptions;
 pub use run::{BatchSettings, Observer, Outcome, Stop, run};
 pub use size::{MAX_SIDE, PictureSize};
+pub use view::{CameraSource, View};

@@ -7,6 +7,8 @@ use super::output::{WriteError, check_writable, write_atomic};
 use super::picture::{FileOptions, exr_bytes, png_bytes};
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Rays, Seconds, Status};
 use super::size::{PictureSize, aspect_note, check_crop, size_for};
+use super::view::CameraSource;
+use crate::camera::Camera;
 use crate::load::{LoadOptions, LoadTimes, load};
 use crate::render::{AccelChoice, DefaultLight, Frame, Progress, RenderSettings, render};
 use crate::scene::Scene;
@@ -26,7 +28,9 @@ pub struct BatchSettings {
     pub name: Option<NameTemplate>,
     /// Size of every picture.
     pub size: PictureSize,
-    /// Which cameras of each file.
+    /// Where the cameras come from.
+    pub camera_source: CameraSource,
+    /// Which of them.
     pub cameras: CameraChoice,
     /// How files are read.
     pub load: LoadOptions,
@@ -82,7 +86,8 @@ impl Outcome {
 /// Renders everything that `settings` asks for.
 ///
 /// # Errors
-/// Nothing was rendered, because names clash, a crop does not fit, or the output folder cannot be written to.
+/// Nothing was rendered, because names clash, a crop does not fit, the cameras from elsewhere are not to be had, or the
+/// output folder cannot be written to.
 pub fn run(settings: &BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
     if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
@@ -90,10 +95,18 @@ pub fn run(settings: &BatchSettings, observer: &mut dyn Observer) -> Result<Outc
     }
     let inputs = expand(&settings.inputs);
     let scene = settings.load.scene.as_deref();
-    let plan = plan(&inputs, settings.name.as_ref(), &settings.cameras, scene).map_err(Stop::Usage)?;
+    let elsewhere = settings.camera_source.cameras().map_err(Stop::Usage)?;
+    let names = elsewhere.as_deref().map(names_of);
+    if let Some(names) = &names {
+        // What is not there is there for no input.
+        let source = settings.camera_source.options();
+        settings.cameras.select(names).map_err(|error| Stop::Usage(format!("{source}: {error}")))?;
+    }
+    let plan =
+        plan(&inputs, settings.name.as_ref(), &settings.cameras, scene, names.as_deref()).map_err(Stop::Usage)?;
     check_writable(&settings.out).map_err(Stop::Unwritable)?;
 
-    let mut run = Run { settings, observer, plan, images: Vec::new(), bad_inputs: 0, unwritable: None };
+    let mut run = Run { settings, observer, plan, elsewhere, images: Vec::new(), bad_inputs: 0, unwritable: None };
     for (index, input) in inputs.iter().enumerate() {
         run.input(index, input);
         if run.unwritable.is_some() {
@@ -125,6 +138,8 @@ struct Run<'a> {
     settings: &'a BatchSettings,
     observer: &'a mut dyn Observer,
     plan: Plan,
+    /// The cameras for every input, if the inputs' own are not wanted.
+    elsewhere: Option<Vec<Camera>>,
     images: Vec<ImageReport>,
     bad_inputs: usize,
     unwritable: Option<WriteError>,
@@ -142,8 +157,11 @@ impl Run<'_> {
             Some(problem) => Err(problem.to_string()),
             None => guarded(|| load(&input.path, &self.settings.load).map_err(|error| error.to_string())),
         };
-        let loaded = loaded.and_then(|(scene, times)| {
-            let names: Vec<String> = scene.cameras.iter().map(|camera| camera.name.clone()).collect();
+        let loaded = loaded.and_then(|(mut scene, times)| {
+            if let Some(cameras) = &self.elsewhere {
+                self.settings.camera_source.replace(&mut scene, cameras);
+            }
+            let names = names_of(&scene.cameras);
             let chosen = self.settings.cameras.select(&names);
             let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;
             Ok((scene, times, names, chosen))
@@ -321,6 +339,10 @@ impl Run<'_> {
             notes: Vec::new(),
         }
     }
+}
+
+fn names_of(cameras: &[Camera]) -> Vec<String> {
+    cameras.iter().map(|camera| camera.name.clone()).collect()
 }
 
 fn fail(image: &mut ImageReport, message: String) {

@@ -12,6 +12,7 @@ fn settings(out: &Path, inputs: Vec<PathBuf>) -> BatchSettings {
         out: out.to_owned(),
         name: None,
         size: PictureSize::Exact(4, 2),
+        camera_source: CameraSource::Inputs,
         cameras: CameraChoice::All,
         load: LoadOptions::default(),
         render: RenderSettings::default(),
@@ -37,7 +38,15 @@ fn frame() -> Frame {
 }
 
 fn under_way<'a>(settings: &'a BatchSettings, observer: &'a mut Silent) -> Run<'a> {
-    Run { settings, observer, plan: Plan::default(), images: Vec::new(), bad_inputs: 0, unwritable: None }
+    Run {
+        settings,
+        observer,
+        plan: Plan::default(),
+        elsewhere: None,
+        images: Vec::new(),
+        bad_inputs: 0,
+        unwritable: None,
+    }
 }
 
 #[test]

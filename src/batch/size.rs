@@ -21,13 +21,21 @@ fn aspect_ratio(scene: &Scene, camera: usize) -> Option<f64> {
     })
 }
 
-/// What to say where an exact size overrules the camera's aspect ratio by more than a pixel's worth.
+/// What to say where an exact size overrules the camera's own shape by more than a pixel's worth.
 pub(super) fn aspect_note(size: PictureSize, scene: &Scene, camera: usize) -> Option<String> {
     let PictureSize::Exact(width, height) = size else { return None };
     let aspect = aspect_ratio(scene, camera)?;
-    let overruled = (f64::from(width) - aspect * f64::from(height)).abs() > aspect.max(1.0);
-    overruled
-        .then(|| format!("--size {width}x{height} overrules the camera's aspectRatio {aspect:.4}; its yfov is kept"))
+    if (f64::from(width) - aspect * f64::from(height)).abs() <= aspect.max(1.0) {
+        return None;
+    }
+    Some(match scene.cameras.get(camera)?.projection {
+        Projection::Perspective { .. } => {
+            format!("--size {width}x{height} overrules the camera's aspectRatio {aspect:.4}; its yfov is kept")
+        }
+        Projection::Orthographic { xmag, ymag } => {
+            format!("--size {width}x{height} overrules the camera's xmag {xmag}; its ymag {ymag} is kept")
+        }
+    })
 }
 
 /// Width and height of the picture of `camera`.
@@ -74,6 +82,21 @@ mod tests {
         let note = |w, h, camera| aspect_note(PictureSize::Exact(w, h), &scene, camera);
         assert!(note(100, 100, 0).is_some_and(|n| n.contains("--size 100x100") && n.contains("2.0000")));
         assert_eq!([note(101, 50, 0), note(100, 100, 1), aspect_note(size, &scene, 0)], [None, None, None]);
+    }
+
+    #[test]
+    fn an_orthographic_cameras_shape_is_xmag_over_ymag_and_xmag_yields() {
+        let camera = Camera {
+            name: String::new(),
+            world_from_camera: glam::DMat4::IDENTITY,
+            projection: Projection::Orthographic { xmag: 6.0, ymag: 2.0 },
+        };
+        let scene = Scene { cameras: vec![camera], ..Scene::default() };
+        assert_eq!(size_for(PictureSize::Width(300), &scene, 0), (300, 100));
+        let note = |w, h| aspect_note(PictureSize::Exact(w, h), &scene, 0);
+        assert_eq!(note(300, 100), None);
+        let said = note(100, 100).unwrap();
+        assert!(said.contains("--size 100x100") && said.contains("xmag 6;") && said.contains("ymag 2 is kept"));
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Cameras as described by the file.
 
 mod filter;
+mod look_at;
 mod rays;
 
 pub use filter::PixelFilter;
+pub use look_at::{NoView, look_at};
 pub use rays::CameraRays;
 
 use glam::DMat4;

@@ -2,6 +2,7 @@
 
 pub mod gltf;
 
+use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -32,5 +33,16 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), Lo
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("gltf" | "glb") => gltf::load(path, options),
         _ => Err(LoadError::new(SourceLoc::file(path), "not a scene file", "Allowed: .gltf, .glb.")),
+    }
+}
+
+/// The cameras of `path`'s default scene, in the order of the file (perhaps none), without reading anything else of it.
+///
+/// # Errors
+/// The file is not of a kind that holds cameras, or is wrong as far as it had to be read.
+pub fn load_cameras(path: &Path) -> Result<Vec<Camera>, LoadError> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("gltf" | "glb") => gltf::load_cameras(path),
+        _ => Err(LoadError::new(SourceLoc::file(path), "not a file that holds cameras", "Allowed: .gltf, .glb.")),
     }
 }

@@ -1,13 +1,13 @@
 //! One frame: prepare, trace, develop.
 
-use super::prepare::{Prepared, prepare};
+use super::framing::{framing_camera, vector_area};
+use super::prepare::prepare;
 use super::{CropWindow, Filter, Frame, FrameCamera, Progress, RenderSettings, RenderStats, schedule};
-use crate::camera::{Camera, CameraRays, PixelFilter, Projection};
+use crate::camera::{CameraRays, PixelFilter};
 use crate::error::RenderError;
 use crate::film::{Film, Tile};
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
-use glam::{DMat4, DVec3};
 use simd::Level;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -47,8 +47,14 @@ fn render_here(
     let prepared = prepare(scene, settings)?;
     let build_seconds = start.elapsed().as_secs_f64();
 
-    let framed = framing_camera(&prepared, f64::from(width) / f64::from(height));
-    let camera = if scene.cameras.is_empty() { &framed } else { &scene.cameras[camera] };
+    let framed;
+    let camera = if scene.cameras.is_empty() {
+        let aspect = f64::from(width) / f64::from(height);
+        framed = framing_camera(prepared.bounds, vector_area(scene), aspect);
+        &framed
+    } else {
+        &scene.cameras[camera]
+    };
     let window = settings.crop.unwrap_or(CropWindow { x: 0, y: 0, width, height });
     let film = Film::new(Tile { x: window.x, y: window.y, width: window.width, height: window.height }, settings.spp);
     let level = match settings.lanes {
@@ -128,30 +134,4 @@ fn render_here(
         aspect_ratio: f64::from(width) / f64::from(height),
     };
     Ok(Frame { width, height, window, pixels, spp: settings.spp, camera: frame_camera, stats })
-}
-
-/// Room left around a scene that has no camera of its own.
-const FRAMING_MARGIN: f64 = 1.08;
-
-/// A camera that sees the whole scene from the front, a little from above: for files without one.
-fn framing_camera(prepared: &Prepared, aspect: f64) -> Camera {
-    let (low, high) = prepared.bounds.unwrap_or((DVec3::splat(-1.0), DVec3::splat(1.0)));
-    let centre = 0.5 * (low + high);
-    let yfov: f64 = 40f64.to_radians();
-    let (tan_y, tan_x) = ((0.5 * yfov).tan(), (0.5 * yfov).tan() * aspect);
-    let towards = DVec3::new(0.35, 0.3, 1.0).normalize();
-    let right = DVec3::Y.cross(towards).normalize();
-    let up = towards.cross(right);
-    // The least distance from which every corner of the bounds is in the picture, and a margin.
-    let distance = (0..8)
-        .map(|i| {
-            let pick = |bit: usize, a: f64, b: f64| if i >> bit & 1 == 0 { a } else { b };
-            let corner = DVec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z)) - centre;
-            let sideways = (corner.dot(right).abs() / tan_x).max(corner.dot(up).abs() / tan_y);
-            FRAMING_MARGIN * sideways + corner.dot(towards)
-        })
-        .fold(1e-6, f64::max);
-    let eye = centre + towards * distance;
-    let world_from_camera = DMat4::from_cols(right.extend(0.0), up.extend(0.0), towards.extend(0.0), eye.extend(1.0));
-    Camera { name: String::new(), world_from_camera, projection: Projection::Perspective { yfov, aspect_ratio: None } }
 }

@@ -3,12 +3,14 @@
 mod default_light;
 mod emission;
 mod frame;
+mod framing;
 mod prepare;
 mod schedule;
 mod settings;
 
 pub use default_light::{DefaultLightReport, LEAST_EMITTED};
 pub use frame::render;
+pub use framing::FRAMING_YFOV;
 pub use prepare::{Prepared, prepare};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
 

@@ -11,7 +11,7 @@ use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::table::MaterialTable;
-use crate::scene::{Instance, Scene};
+use crate::scene::{Instance, MAX_COORDINATE, Scene};
 use crate::shape::Mesh;
 use crate::shape::table::{Corners, NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
@@ -44,7 +44,13 @@ struct Totals {
     surface: SurfaceTotals,
     /// Their vertex normals all pointed to the back, and were turned round.
     turned_normals: usize,
+    /// Triangles that are not finite or too far away for every backend.
+    too_far: usize,
 }
+
+/// Triangles of less area are not sampled as lights, m^2: the density of a point on them, 1 / area at most, would leave
+/// the range of f32. Paths still find what they emit.
+const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
 
 /// Prepares `scene`.
 ///
@@ -78,6 +84,10 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
              counter-clockwise",
             totals.turned_normals
         ));
+    }
+    if totals.too_far > 0 {
+        let count = totals.too_far;
+        warnings.push(format!("{count} triangles are not finite or beyond 1.844e18 once placed and were dropped"));
     }
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
     punctual(scene, origin, radius, &mut lights);
@@ -118,15 +128,26 @@ fn bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
     let mut bounds: Option<(DVec3, DVec3)> = None;
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh.index()];
-        // Only vertices that a triangle uses.
-        for &i in mesh.indices.as_flattened() {
-            let p =
-                instance.world_from_object.transform_point3(glam::Vec3::from(mesh.positions[i as usize]).as_dvec3());
-            let (low, high) = bounds.get_or_insert((p, p));
-            (*low, *high) = (low.min(p), high.max(p));
+        // Only vertices that a triangle uses, and only triangles that are kept: one that flies off to 1e30 m would leave
+        // the others no digits.
+        for triangle in &mesh.indices {
+            let place = |i: u32| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3();
+            let corners = triangle.map(|i| instance.world_from_object.transform_point3(place(i)));
+            if !corners.iter().all(is_usable) {
+                continue;
+            }
+            for p in corners {
+                let (low, high) = bounds.get_or_insert((p, p));
+                (*low, *high) = (low.min(p), high.max(p));
+            }
         }
     }
     bounds
+}
+
+/// Whether every backend takes a triangle with the corner `p`; placing it may have moved it out of range.
+fn is_usable(p: &DVec3) -> bool {
+    p.to_array().iter().all(|c| c.abs() <= f64::from(MAX_COORDINATE))
 }
 
 /// Appends one instance in world space, recentred, vertices transformed in f64 and rounded once.
@@ -143,7 +164,7 @@ fn flatten(
 ) {
     let mesh = &scene.meshes[instance.mesh.index()];
     let material = scene.materials.get(mesh.material.index());
-    let linear = DMat3::from_mat4(instance.world_from_object);
+    let linear = scaled(DMat3::from_mat4(instance.world_from_object));
     // Normals go by the cofactor matrix: no division, so nearly singular transforms stay finite. A mirroring transform
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
@@ -165,9 +186,13 @@ fn flatten(
         let corners = [corner(i), corner(j), corner(k)];
         // In f64: the f32 product of edges below 3e-10 underflows.
         let edges = corners.map(|c| c.as_dvec3());
+        if !edges.iter().all(is_usable) {
+            totals.too_far += 1;
+            continue;
+        }
         let cross = (edges[1] - edges[0]).cross(edges[2] - edges[0]);
         let area = 0.5 * cross.length();
-        if area == 0.0 || !area.is_finite() {
+        if area == 0.0 {
             totals.without_area += 1;
             continue;
         }
@@ -197,7 +222,7 @@ fn flatten(
         let primitive = geometry.indices.len() as u32;
         geometry.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
-        if average > 0.0 {
+        if average > 0.0 && area > LEAST_SAMPLED_AREA {
             let power = average * area * sides * std::f64::consts::PI;
             let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
             lights.push((light, power));
@@ -213,8 +238,14 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
     table.push_attributes(&Corners { normals, uvs, colors })
 }
 
+/// `m` over its largest element: directions stay, and products of three elements stay in range whatever the scale.
+fn scaled(m: DMat3) -> DMat3 {
+    let largest = m.to_cols_array().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if largest == 0.0 { m } else { DMat3::from_cols_array(&m.to_cols_array().map(|x| x / largest)) }
+}
+
 /// Matrix of cofactors: the inverse transpose times the determinant.
-fn cofactor(m: DMat3) -> DMat3 {
+pub(super) fn cofactor(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 

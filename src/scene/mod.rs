@@ -6,6 +6,7 @@ mod check;
 
 pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
 pub use builder::SceneBuilder;
+pub(crate) use check::MAX_COORDINATE;
 
 use crate::camera::Camera;
 use crate::light::{Environment, Light};

@@ -14,6 +14,8 @@ Examples:
   prt-batch scenes/ -o renders -s 256          every scene below a folder, 256 samples per pixel
   prt-batch a.glb --size 320x180 --spp 16      a quick look
   prt-batch a.glb --camera Main --crop 100,50,64,64
+  prt-batch models/ --camera-from studio.gltf  every file as the cameras of another see it
+  prt-batch a.glb --eye 3,2,5 --look-at 0,1,0  from a place of your own
   prt-batch scenes/*.gltf --json > result.json
   prt-batch compare renders/a.exr reference/a.exr --max-relmse 1e-3
 
@@ -64,6 +66,22 @@ pub struct RenderArgs {
     /// Which cameras: all, an index or a name
     #[arg(long, value_name = "CAMERA", default_value = "all", value_parser = parse::camera)]
     pub camera: CameraChoice,
+    /// Cameras of this glTF file's default scene, for every input and in place of its own
+    #[arg(long, value_name = "FILE")]
+    pub camera_from: Option<PathBuf>,
+    /// A camera at this place, for every input and in place of its own; metres, needs --look-at
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true)]
+    #[arg(requires = "look_at", conflicts_with_all = ["camera_from", "camera"])]
+    pub eye: Option<[f64; 3]>,
+    /// The point in the middle of the picture from --eye
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true, requires = "eye")]
+    pub look_at: Option<[f64; 3]>,
+    /// What points up in the picture from --eye [default: 0,1,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true, requires = "eye")]
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view from --eye, degrees [default: 40]
+    #[arg(long, value_name = "DEG", value_parser = parse::yfov, requires = "eye")]
+    pub yfov: Option<f64>,
     /// Which scene: an index or a name [default: the file's]
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<String>,

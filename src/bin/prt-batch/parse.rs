@@ -62,6 +62,21 @@ pub fn camera(value: &str) -> Result<CameraChoice, String> {
     })
 }
 
+/// Three numbers in a range where their squares' sums stay numbers in the renderer's 32 bits.
+pub fn vector(value: &str) -> Result<[f64; 3], String> {
+    const MOST: f64 = 1e18;
+    let inside = |n: &f64| n.abs() <= MOST;
+    let numbers: Option<Vec<f64>> = value.split(',').map(|n| n.trim().parse().ok().filter(inside)).collect();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| format!("must be X,Y,Z: three numbers from -{MOST:e} to {MOST:e}, such as 3,2.5,-1"))
+}
+
+pub fn yfov(value: &str) -> Result<f64, String> {
+    let inside = |degrees: &f64| *degrees > 0.0 && *degrees < 180.0;
+    value.parse().ok().filter(inside).ok_or_else(|| "must be degrees above 0 and below 180".into())
+}
+
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
 }

@@ -4,11 +4,6 @@ use clap::{Arg, ArgAction, ArgMatches, Command};
 
 /// Options of `render`, and whether a value follows.
 const OPTIONS: &[(&str, bool)] = &[
-    ("camera-from", true),
-    ("eye", true),
-    ("look-at", true),
-    ("up", true),
-    ("yfov", true),
     ("frames", true),
     ("fps", true),
     ("animation", true),

@@ -21,6 +21,7 @@ mod texture;
 mod uri;
 
 use super::{LoadOptions, LoadTimes};
+use crate::camera::Camera;
 use crate::error::LoadError;
 use crate::scene::{MeshId, Scene, SceneBuilder};
 use document::Document;
@@ -59,6 +60,22 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
     let scene = loader.builder.finish();
     let total = start.elapsed().as_secs_f64();
     Ok((scene, LoadTimes { load: total - decode, decode }))
+}
+
+/// The cameras of the default scene of a `.gltf` or `.glb` file, and nothing else: no mesh, buffer or image is opened.
+///
+/// # Errors
+/// See [`super::load_cameras`].
+pub fn load_cameras(path: &Path) -> Result<Vec<Camera>> {
+    let doc = Document::open(path, None)?;
+    check::asset(&doc)?;
+    check::integers(&doc)?;
+    extensions::check_required(&doc)?;
+    let parents = check::tree(&doc)?;
+    let chosen = node::choose_scene(&doc, None, &parents)?;
+    let mut loader = Loader::new(&doc, chosen.index);
+    node::walk_cameras(&mut loader, &chosen.roots)?;
+    Ok(loader.builder.finish().cameras)
 }
 
 /// What has been read so far, so that shared things are read once.

@@ -90,6 +90,20 @@ fn find_scene(doc: &Document, wanted: &str) -> Result<usize> {
 
 /// Places what the nodes below `roots` carry, in the order of the file (parents first).
 pub(super) fn walk(loader: &mut Loader, roots: &[usize]) -> Result<()> {
+    visit(loader, roots, place)
+}
+
+/// Places the cameras below `roots` and nothing else.
+pub(super) fn walk_cameras(loader: &mut Loader, roots: &[usize]) -> Result<()> {
+    visit(loader, roots, place_camera)
+}
+
+/// Calls `place` with every node below `roots`, its index and its world transform.
+fn visit(
+    loader: &mut Loader,
+    roots: &[usize],
+    place: fn(&mut Loader, &Node, usize, DMat4) -> Result<()>,
+) -> Result<()> {
     // A stack of our own: files with very deep trees exist.
     let mut stack: Vec<(usize, DMat4)> = roots.iter().rev().map(|&i| (i, DMat4::IDENTITY)).collect();
     while let Some((i, above)) = stack.pop() {
@@ -122,15 +136,19 @@ fn place(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Result<()>
             loader.builder.add_instance(Instance { mesh, world_from_object: world, name: name.clone() });
         }
     }
-    if let Some(index) = node.camera {
-        let given = node.name.as_deref().unwrap_or_default();
-        camera::place(loader, index, &format!("{at}/camera"), world, &at, given)?;
-    }
+    place_camera(loader, node, i, world)?;
     if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
         let pointer = format!("{at}/extensions/KHR_lights_punctual/light");
         light::place(loader, light.light, &pointer, world, &at, &name)?;
     }
     Ok(())
+}
+
+fn place_camera(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Result<()> {
+    let Some(index) = node.camera else { return Ok(()) };
+    let at = format!("/nodes/{i}");
+    let given = node.name.as_deref().unwrap_or_default();
+    camera::place(loader, index, &format!("{at}/camera"), world, &at, given)
 }
 
 /// The node's own transform.

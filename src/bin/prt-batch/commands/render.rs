@@ -2,7 +2,7 @@
 
 use crate::args::RenderArgs;
 use crate::term::{self, Reporter, Verbosity};
-use prt::batch::{self, BatchSettings, FileOptions, PictureSize, Stop};
+use prt::batch::{self, BatchSettings, CameraSource, FileOptions, PictureSize, Stop, View};
 use prt::color::ToneMap;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
@@ -61,6 +61,7 @@ fn settings(args: &RenderArgs) -> BatchSettings {
         out: args.out.clone(),
         name: args.name.clone(),
         size: args.size.map_or(width, |(width, height)| PictureSize::Exact(width, height)),
+        camera_source: camera_source(args),
         cameras: args.camera.clone(),
         load: LoadOptions { asset_root: args.asset_root.clone(), scene: args.scene.clone() },
         render,
@@ -71,6 +72,19 @@ fn settings(args: &RenderArgs) -> BatchSettings {
             tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
         },
         command: command_line(),
+    }
+}
+
+fn camera_source(args: &RenderArgs) -> CameraSource {
+    match (&args.camera_from, args.eye, args.look_at) {
+        (Some(file), ..) => CameraSource::File(file.clone()),
+        (None, Some(eye), Some(look_at)) => CameraSource::View(View {
+            eye: eye.into(),
+            look_at: look_at.into(),
+            up: args.up.unwrap_or([0.0, 1.0, 0.0]).into(),
+            yfov: args.yfov.unwrap_or(View::DEFAULT_YFOV),
+        }),
+        _ => CameraSource::Inputs,
     }
 }
 
