@@ -20,7 +20,7 @@ const MAY_USE: [(&str, &[&str]); 18] = [
     ("scene", &["camera", "error", "id", "light", "material", "math", "shape", "texture"]),
     ("accel", &["error", "math"]),
     ("film", &["math"]),
-    ("load", &["camera", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
+    ("load", &["camera", "color", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
     ("integrator", &["accel", "camera", "light", "material", "math", "sampler", "shape", "texture"]),
     ("compare", &["image"]),
     (

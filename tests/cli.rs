@@ -97,9 +97,6 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         "--aperture-blades",
         "--sensor",
         "--aov",
-        "--obj-up",
-        "--obj-scale",
-        "--smooth-angle",
         "--config",
         "--memory",
     ] {

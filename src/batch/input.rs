@@ -4,7 +4,7 @@ use crate::error::{LoadError, SourceLoc};
 use std::path::{Path, PathBuf};
 
 /// Extensions of scene files, lower case. The first of two files that differ only in it keeps the plain output name.
-pub const SCENE_EXTENSIONS: [&str; 2] = ["gltf", "glb"];
+pub const SCENE_EXTENSIONS: [&str; 3] = ["gltf", "glb", "obj"];
 
 /// One file to render, or the reason why there is none.
 #[derive(Clone, Debug)]
@@ -54,7 +54,7 @@ fn expand_one(path: &Path, inputs: &mut Vec<Input>) -> Result<(), LoadError> {
         LoadError::new(SourceLoc::file(&folder), format!("the folder cannot be read: {error}"), "")
     })?;
     if inputs.len() == before {
-        return Err(LoadError::new(at(), "there is no scene file in this folder", "Looked for .gltf and .glb."));
+        return Err(LoadError::new(at(), "there is no scene file in this folder", "Looked for .gltf, .glb and .obj."));
     }
     Ok(())
 }
@@ -95,7 +95,7 @@ mod tests {
     #[test]
     fn a_folder_means_every_scene_below_it_with_its_sub_folders() {
         let root = tempfile::tempdir().unwrap();
-        for name in ["b.gltf", "a.GLB", "a.bin", "sub/deep/c.gltf", "sub/readme.txt"] {
+        for name in ["b.gltf", "a.GLB", "a.bin", "sub/deep/c.gltf", "sub/readme.txt", "sub/d.OBJ"] {
             let path = root.path().join(name);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, "").unwrap();
@@ -105,7 +105,7 @@ mod tests {
             .iter()
             .map(|i| (i.path.strip_prefix(root.path()).unwrap().to_str().unwrap(), i.folder.to_str().unwrap()))
             .collect();
-        assert_eq!(found, [("a.GLB", ""), ("b.gltf", ""), ("sub/deep/c.gltf", "sub/deep")]);
+        assert_eq!(found, [("a.GLB", ""), ("b.gltf", ""), ("sub/d.OBJ", "sub"), ("sub/deep/c.gltf", "sub/deep")]);
     }
 
     #[test]

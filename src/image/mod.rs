@@ -4,4 +4,5 @@ pub mod decode;
 pub mod exr;
 mod exr_header;
 pub mod exr_read;
+pub mod old;
 pub mod png;

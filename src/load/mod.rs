@@ -1,6 +1,8 @@
 //! Files to [`Scene`]s, by extension.
 
+mod folders;
 pub mod gltf;
+pub mod obj;
 
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};
@@ -14,6 +16,13 @@ pub struct LoadOptions {
     pub asset_root: Option<PathBuf>,
     /// Which scene of the file: an index or a name; `None` = the file's default.
     pub scene: Option<String>,
+    /// OBJ: which axis points up.
+    pub obj_up: obj::ObjUp,
+    /// OBJ: metres per unit, above 0; `None` = 1.
+    pub obj_scale: Option<f64>,
+    /// OBJ: where the file gives no normals, edges whose faces make less than this many degrees are smooth, in place of
+    /// the file's smoothing groups.
+    pub smooth_angle: Option<f32>,
 }
 
 /// Times of one load, seconds of wall clock.
@@ -32,7 +41,8 @@ pub struct LoadTimes {
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), LoadError> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("gltf" | "glb") => gltf::load(path, options),
-        _ => Err(LoadError::new(SourceLoc::file(path), "not a scene file", "Allowed: .gltf, .glb.")),
+        Some("obj") => obj::load(path, options),
+        _ => Err(LoadError::new(SourceLoc::file(path), "not a scene file", "Allowed: .gltf, .glb, .obj.")),
     }
 }
 

@@ -5,6 +5,7 @@ use clap::{Args, Parser, Subcommand};
 use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::ToneCurve;
 use prt::image::exr::ExrCompression;
+use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::path::PathBuf;
 
@@ -43,7 +44,7 @@ pub enum Command {
 
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// `.gltf` and `.glb` files; a folder means every such file below it
+    /// `.gltf`, `.glb` and `.obj` files; a folder means every such file below it
     #[arg(value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
 
@@ -137,6 +138,15 @@ pub struct RenderArgs {
     /// Files may be read below this folder instead of only below the input's own
     #[arg(long, value_name = "DIR")]
     pub asset_root: Option<PathBuf>,
+    /// OBJ: which axis points up, y or z
+    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = parse::obj_up)]
+    pub obj_up: ObjUp,
+    /// OBJ: metres per unit [default: 1]
+    #[arg(long, value_name = "S", value_parser = parse::obj_scale, allow_hyphen_values = true)]
+    pub obj_scale: Option<f64>,
+    /// OBJ: where the file gives no normals, edges below this angle are smooth [default: smoothing groups]
+    #[arg(long, value_name = "DEG", value_parser = parse::smooth_angle, allow_hyphen_values = true)]
+    pub smooth_angle: Option<f32>,
     /// Worker threads; they do not change a byte of a picture [default: the cores this process may use]
     #[arg(short, long, value_name = "N", value_parser = parse::threads)]
     pub threads: Option<usize>,

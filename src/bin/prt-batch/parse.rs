@@ -3,6 +3,7 @@
 use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::ToneCurve;
 use prt::image::exr::ExrCompression;
+use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::str::FromStr;
 
@@ -163,6 +164,20 @@ pub fn progress(value: &str) -> Result<ProgressStyle, String> {
 
 pub fn name(value: &str) -> Result<NameTemplate, String> {
     NameTemplate::parse(value)
+}
+
+pub fn obj_up(value: &str) -> Result<ObjUp, String> {
+    word(value, &[("y", ObjUp::Y), ("z", ObjUp::Z)], &[])
+}
+
+pub fn obj_scale(value: &str) -> Result<f64, String> {
+    let inside = |scale: &f64| (1e-9..=1e9).contains(scale);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be a number of metres per unit from 1e-9 to 1e9".into())
+}
+
+pub fn smooth_angle(value: &str) -> Result<f32, String> {
+    let inside = |angle: &f32| (0.0..=180.0).contains(angle);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be a number of degrees from 0 to 180".into())
 }
 
 /// A number above 0, or 0.

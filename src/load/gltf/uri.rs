@@ -3,8 +3,10 @@
 use super::document::Document;
 use super::locate::shorten;
 use super::{Result, base64};
-use crate::error::{LoadError, SourceLoc};
-use std::path::{Component, Path, PathBuf};
+use std::path::PathBuf;
+
+/// Where URIs may lead.
+pub(super) use crate::load::folders::Folders as Resolver;
 
 /// What a URI stands for.
 pub(super) enum Source {
@@ -12,36 +14,6 @@ pub(super) enum Source {
     Data(Vec<u8>, String),
     /// A file that may be read.
     File(PathBuf),
-}
-
-/// Where URIs may lead.
-pub(super) struct Resolver {
-    /// The input's folder, without links.
-    base: PathBuf,
-    /// The input's folder as the user sees it.
-    shown: PathBuf,
-    /// Files may be read below these, without links.
-    roots: Vec<PathBuf>,
-}
-
-impl Resolver {
-    /// For the URIs of `file`.
-    pub fn new(file: &Path, asset_root: Option<&Path>) -> Result<Self> {
-        let shown = match file.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        let canonical = |path: &Path, what: &str, fix: &str| {
-            let why = |e| LoadError::new(SourceLoc::file(file), format!("{what} {}: {e}", path.display()), fix);
-            path.canonicalize().map_err(why)
-        };
-        let base = canonical(&shown, "the folder of the file", "")?;
-        let mut roots = vec![base.clone()];
-        if let Some(root) = asset_root {
-            roots.push(canonical(root, "--asset-root", "It must be a folder that exists.")?);
-        }
-        Ok(Self { base, shown, roots })
-    }
 }
 
 impl Document {
@@ -71,44 +43,8 @@ impl Document {
         if path.starts_with('/') || scheme(&path).is_some() {
             return refuse("is absolute", RELATIVE);
         }
-        self.confine(pointer, uri, &path)
-    }
-
-    /// `path` below the input's folder, if it is in an allowed folder both as written and with links followed.
-    fn confine(&self, pointer: &str, uri: &str, path: &str) -> Result<Source> {
-        let outside = |how: &str| {
-            let roots: Vec<_> = self.uris.roots.iter().map(|r| r.display().to_string()).collect();
-            let fix = format!(
-                "Files are read only below {}. Move the file there, or name a folder above both with --asset-root DIR.",
-                roots.join(" and ")
-            );
-            self.error(pointer, format!("\"{}\" {how}", shorten(uri)), fix)
-        };
-        let allowed = |path: &Path| self.uris.roots.iter().any(|root| path.starts_with(root));
-        // First as written, so that nothing outside is even asked about.
-        let mut target = self.uris.base.clone();
-        for component in Path::new(path).components() {
-            match component {
-                Component::Normal(name) => target.push(name),
-                Component::CurDir => {}
-                Component::ParentDir => {
-                    target.pop();
-                }
-                Component::RootDir | Component::Prefix(_) => return Err(outside("is absolute")),
-            }
-        }
-        if !allowed(&target) {
-            return Err(outside("leaves the folder of the file"));
-        }
-        let real = target.canonicalize().map_err(|e| {
-            let shown = self.uris.shown.join(path);
-            let fix = "Put the file there, or correct the URI (upper and lower case count).";
-            self.error(pointer, format!("\"{}\": {}: {e}", shorten(uri), shown.display()), fix)
-        })?;
-        if !allowed(&real) {
-            return Err(outside("is a link that leaves the folder of the file"));
-        }
-        Ok(Source::File(real))
+        let found = self.uris.confine(&path);
+        found.map(Source::File).map_err(|r| self.error(pointer, format!("\"{}\" {}", shorten(uri), r.problem), r.fix))
     }
 
     /// `[type][;parameters];base64,payload`.

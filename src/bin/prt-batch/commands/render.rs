@@ -15,7 +15,7 @@ const DEFAULT_WIDTH: u32 = 1280;
 pub fn run(args: &RenderArgs) -> ExitCode {
     if args.inputs.is_empty() {
         return term::usage(
-            "no INPUT: give .gltf or .glb files, or a folder of them, such as: prt-batch scenes/ --out renders",
+            "no INPUT: give .gltf, .glb or .obj files, or a folder of them, such as: prt-batch scenes/ --out renders",
         );
     }
     let settings = settings(args);
@@ -63,7 +63,13 @@ fn settings(args: &RenderArgs) -> BatchSettings {
         size: args.size.map_or(width, |(width, height)| PictureSize::Exact(width, height)),
         camera_source: camera_source(args),
         cameras: args.camera.clone(),
-        load: LoadOptions { asset_root: args.asset_root.clone(), scene: args.scene.clone() },
+        load: LoadOptions {
+            asset_root: args.asset_root.clone(),
+            scene: args.scene.clone(),
+            obj_up: args.obj_up,
+            obj_scale: args.obj_scale,
+            smooth_angle: args.smooth_angle,
+        },
         render,
         files: FileOptions {
             exr: !args.no_exr,
