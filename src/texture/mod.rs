@@ -57,7 +57,7 @@ pub struct Texture {
 pub struct TextureRef {
     /// What is read.
     pub texture: TextureId,
-    /// Where: index into [`crate::shape::Mesh::uv_sets`], less than [`crate::math::MAX_UV_SETS`].
+    /// Where: index into `Mesh::uv_sets`, less than [`crate::math::MAX_UV_SETS`].
     pub uv_set: u32,
     /// Applied to the mesh's coordinates first (`KHR_texture_transform`); `None` = as they are.
     pub transform: Option<UvTransform>,
