@@ -1,6 +1,6 @@
 //! TGA and BMP, which OBJ files of old still name, to 8-bit RGBA; bounded like [`super::decode`].
 
-use super::decode::{DecodeError, MAX_PIXELS, MAX_SIDE, Rgba8};
+use super::decode::{DecodeError, Decoded, MAX_PIXELS, MAX_SIDE, Pixels};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,14 +22,14 @@ pub enum Format {
 ///
 /// # Errors
 /// Too large, cut short or damaged.
-pub fn rgba8(bytes: &[u8], format: Format) -> Result<Rgba8, DecodeError> {
+pub fn rgba(bytes: &[u8], format: Format) -> Result<Decoded, DecodeError> {
     // As in `decode`: a bug of the decoder costs this picture only.
     catch_unwind(AssertUnwindSafe(|| decode(bytes, format))).unwrap_or_else(|_| {
         Err(DecodeError { problem: "the decoder failed on this image".into(), fix: "Save the image again." })
     })
 }
 
-fn decode(bytes: &[u8], format: Format) -> Result<Rgba8, DecodeError> {
+fn decode(bytes: &[u8], format: Format) -> Result<Decoded, DecodeError> {
     let (name, kind) = match format {
         Format::Tga => ("TGA", ImageFormat::Tga),
         Format::Bmp => ("BMP", ImageFormat::Bmp),
@@ -56,7 +56,7 @@ fn decode(bytes: &[u8], format: Format) -> Result<Rgba8, DecodeError> {
         return Err(DecodeError { problem, fix: "The image is cut short or made to exhaust memory." });
     }
     let pixels = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgba8();
-    Ok(Rgba8 { width, height, texels: pixels.as_raw().as_chunks::<4>().0.to_vec() })
+    Ok(Decoded { width, height, pixels: Pixels::Rgba8(pixels.as_raw().as_chunks::<4>().0.to_vec()) })
 }
 
 #[cfg(test)]
@@ -73,8 +73,9 @@ mod tests {
         image::codecs::tga::TgaEncoder::new(&mut tga).write_image(&PIXELS, 2, 2, color).unwrap();
         image::codecs::bmp::BmpEncoder::new(&mut bmp).write_image(&PIXELS, 2, 2, color).unwrap();
         for (bytes, format) in [(tga, Format::Tga), (bmp, Format::Bmp)] {
-            let image = rgba8(&bytes, format).unwrap();
-            assert_eq!(image.texels, [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [9, 9, 9, 255]]);
+            let image = rgba(&bytes, format).unwrap();
+            let expected = vec![[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [9, 9, 9, 255]];
+            assert_eq!(image.pixels, Pixels::Rgba8(expected));
             (0..bytes.len()).for_each(|n| drop(decode(&bytes[..n], format)));
         }
     }
@@ -84,7 +85,7 @@ mod tests {
         // The header of a run-length coded TGA of 16384 x 16384.
         let mut bytes = vec![0, 0, 10, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 64, 0, 64, 24, 0];
         bytes.extend([0xFF, 1, 2, 3]);
-        let error = rgba8(&bytes, Format::Tga).unwrap_err();
+        let error = rgba(&bytes, Format::Tga).unwrap_err();
         assert!(error.problem.contains("cannot be in 22 bytes"), "{error:?}");
     }
 }

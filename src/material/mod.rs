@@ -4,7 +4,7 @@ pub mod bsdf;
 mod bump;
 pub mod table;
 
-use crate::texture::{Param, TextureRef};
+use crate::texture::{Channels, Param, TextureRef};
 
 /// What is seen through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +55,41 @@ pub struct Material {
 }
 
 impl Material {
-    /// Every texture that it reads.
+    /// Every texture that it reads, as often as it has parameters that read it.
     pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
-        let colors = [self.base_color.texture, self.emission.texture, self.specular_color.texture];
-        let scalars = [self.opacity.texture, self.metallic.texture, self.roughness.texture, self.normal.texture];
-        colors.into_iter().chain(scalars).chain([self.bump.texture, self.specular.texture]).flatten()
+        self.channels().into_iter().map(|(texture, _)| texture)
+    }
+
+    /// Every texture that it reads, with the channels that matter.
+    pub fn channels(&self) -> Vec<(TextureRef, Channels)> {
+        let slots = [
+            (self.base_color.texture, Channels::RGB),
+            (self.opacity.texture, Channels::A),
+            (self.metallic.texture, Channels::B),
+            (self.roughness.texture, Channels::G),
+            (self.normal.texture, Channels::RGB),
+            (self.bump.texture, Channels::R),
+            (self.emission.texture, Channels::RGB),
+            (self.specular.texture, Channels::A),
+            (self.specular_color.texture, Channels::RGB),
+        ];
+        slots.into_iter().filter_map(|(texture, channels)| texture.map(|t| (t, channels))).collect()
+    }
+
+    /// What [`Material::textures`] lists, to be changed.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureRef> {
+        let slots = [
+            &mut self.base_color.texture,
+            &mut self.opacity.texture,
+            &mut self.metallic.texture,
+            &mut self.roughness.texture,
+            &mut self.normal.texture,
+            &mut self.bump.texture,
+            &mut self.emission.texture,
+            &mut self.specular.texture,
+            &mut self.specular_color.texture,
+        ];
+        slots.into_iter().flatten()
     }
 }
 

@@ -45,6 +45,15 @@ fn mean_color(texels: &Texels) -> [f64; 3] {
             let value = |v: u16| linear_from_srgb(f64::from(v) / 65535.0);
             [0, 1, 2].map(|c| texels.iter().map(|t| value(t[c])).sum::<f64>() / n)
         }
+        Texels::Few8(_) | Texels::Few16(_) => {
+            let mut sums = [0.0; 3];
+            for i in 0..texels.len() {
+                for (sum, value) in sums.iter_mut().zip(texels.get(i)) {
+                    *sum += linear_from_srgb(f64::from(value));
+                }
+            }
+            sums.map(|sum| sum / n)
+        }
     }
 }
 

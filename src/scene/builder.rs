@@ -5,7 +5,7 @@ use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;
 use crate::shape::Mesh;
-use crate::texture::{Image, Texture};
+use crate::texture::{Channels, Image, Texture};
 
 /// A scene under construction.
 #[derive(Debug, Default)]
@@ -38,6 +38,20 @@ impl SceneBuilder {
     add!(add_material, materials, Material, MaterialId);
     add!(add_texture, textures, Texture, TextureId);
     add!(add_image, images, Image, ImageId);
+
+    /// The channels that the materials read of each image, by its id; images beyond the end are read by none.
+    pub fn channels(&self) -> Vec<Channels> {
+        let mut used = Vec::new();
+        for (read, channels) in self.scene.materials.iter().flat_map(Material::channels) {
+            let Some(texture) = self.scene.textures.get(read.texture.index()) else { continue };
+            let image = texture.image.index();
+            if used.len() <= image {
+                used.resize(image + 1, Channels::NONE);
+            }
+            used[image] |= channels;
+        }
+        used
+    }
 
     /// Places a mesh.
     pub fn add_instance(&mut self, instance: Instance) {

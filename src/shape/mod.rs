@@ -12,7 +12,7 @@ pub struct Mesh {
     /// `[n][3]` shading normals, object space, any length; `None` = flat shading.
     pub normals: Option<Vec<[f32; 3]>>,
     /// Sets of `[n][2]` texture coordinates, v = 0 at the top: those that the material's textures name, in the order of
-    /// their [`crate::texture::TextureRef::uv_set`]; at most [`crate::math::MAX_UV_SETS`]. A set that is missing reads as 0.
+    /// their `TextureRef::uv_set`; at most [`crate::math::MAX_UV_SETS`]. A set that is missing reads as 0.
     pub uv_sets: Vec<Vec<[f32; 2]>>,
     /// `[n][4]` vertex colours, linear R G B and opacity; they multiply the base colour.
     pub colors: Option<Vec<[f32; 4]>>,

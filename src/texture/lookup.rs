@@ -1,10 +1,13 @@
 //! Texture lookups over N lanes: wrap, bilinear or nearest at level 0, decoded to linear before filtering.
 //!
-//! All texels of a scene lie in one array, so lanes with different textures are read together.
+//! All texels of a scene lie in one array, so lanes with different textures are read together. An image keeps as many
+//! channels and bits as it has (see [`Texels`]): 1, 2, 4 or 8 bytes a texel, its channels found by shifts per lane. Where
+//! all lanes have the common four bytes, those shifts are the same for all and cost nothing.
 
-use super::{Filter, Image, Texels, Texture, TextureRef, Wrap};
+use super::{Few, Filter, Image, Texels, Texture, TextureRef, Wrap};
 use crate::math::{UvSets, V3, lanes::lerp};
-use simd::{Float, Lanes, Uint};
+use simd::{Float, Lanes, Mask, Uint};
+use std::collections::BTreeMap;
 
 /// No texture, in tables.
 pub const NO_TEXTURE: u32 = u32::MAX;
@@ -12,26 +15,39 @@ pub const NO_TEXTURE: u32 = u32::MAX;
 /// The textures of a scene, ready to be read: each as some material reads it, which is called a binding.
 #[derive(Clone, Debug, Default)]
 pub struct TextureTable {
-    /// Per texture of the scene: first texel, width, height (as integers' bits), flags.
+    /// Per texture of the scene: first word, width, height (as integers' bits), flags.
     textures: Vec<[f32; 4]>,
-    /// What each binding stands for.
-    bindings: Vec<TextureRef>,
+    /// The binding of each texture with its set of coordinates and the bits of its transform.
+    bindings: BTreeMap<(u32, u32, Option<[u32; 6]>), u32>,
     /// Per binding: the texture's record with the set of coordinates in its flags.
     headers: Vec<[f32; 4]>,
     /// Two per binding: the rows of its transform.
     transforms: Vec<[f32; 4]>,
     /// Some binding has a transform.
     has_transforms: bool,
-    /// R, G, B, A from the low byte up, rows from the top.
-    texels: Vec<u32>,
+    /// Some image has other texels than R, G, B, A of 8 bits.
+    has_packed: bool,
+    /// Some image has texels of two words.
+    has_wide: bool,
+    /// Texels from the low byte up, rows from the top; an image starts at a word.
+    words: Vec<u32>,
 }
 
 const WRAP_BITS: u32 = 2;
 const CLAMP: u32 = 1;
 const MIRROR: u32 = 2;
 const NEAREST: u32 = 1 << (2 * WRAP_BITS);
-/// Where the set of coordinates is in the flags.
+/// Where the set of coordinates is in the flags, two bits.
 const UV_SET_SHIFT: u32 = 8;
+const UV_SET_MASK: u32 = 3;
+/// Texels are not R, G, B, A of 8 bits each.
+const PACKED: u32 = 1 << 10;
+/// Channels have 16 bits.
+const DEEP: u32 = 1 << 11;
+/// Where the binary logarithm of the bytes a texel is in the flags, two bits.
+const SIZE_SHIFT: u32 = 12;
+/// Where the places of R, G, B and A in a texel are in the flags, two bits each.
+const PLACES_SHIFT: u32 = 16;
 
 /// What the R, G, B bytes mean; A is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,58 +67,117 @@ pub struct Texel<L: Lanes> {
     pub a: L::F,
 }
 
+/// How the lanes' textures keep their texels.
+#[derive(Clone, Copy)]
+struct Packing<L: Lanes> {
+    /// Binary logarithm of the bytes a texel.
+    size: L::U,
+    /// The first bit of R, G, B and A in a texel.
+    at: [L::U; 4],
+    /// The bits of a channel.
+    mask: L::U,
+    /// 1 / the largest value of a channel.
+    scale: L::F,
+}
+
+impl<L: Lanes> Packing<L> {
+    #[inline(always)]
+    fn new(flags: L::U) -> Self {
+        let three = L::U::splat(3);
+        let deep = flags.has(DEEP);
+        // Eight or sixteen bits from one place to the next.
+        let bits = L::U::splat(4).or_else(deep, three);
+        let places = flags.shr(PLACES_SHIFT);
+        Self {
+            size: flags.shr(SIZE_SHIFT) & three,
+            at: [
+                (places & three).shl_each(bits),
+                (places.shr(2) & three).shl_each(bits),
+                (places.shr(4) & three).shl_each(bits),
+                (places.shr(6) & three).shl_each(bits),
+            ],
+            mask: L::U::splat(0xffff).or_else(deep, L::U::splat(0xff)),
+            scale: L::F::splat(1.0 / 65535.0).or_else(deep, L::F::splat(1.0 / 255.0)),
+        }
+    }
+}
+
 impl TextureTable {
     /// Packs `images` once each, in order.
     ///
     /// # Errors
     /// More texels than a 32-bit index reaches.
     pub fn new(textures: &[Texture], images: &[Image]) -> Result<Self, crate::error::RenderError> {
-        let total: usize = images.iter().map(|i| i.texels.len()).sum();
+        let mut table = Self::default();
+        let total: usize = images.iter().map(|i| words_of(&i.texels)).sum();
         if total >= i32::MAX as usize {
-            return Err(crate::error::RenderError::TooLarge(format!("{total} texels; at most {}", i32::MAX)));
+            let problem = format!("{total} words of texels; at most {}", i32::MAX);
+            return Err(crate::error::RenderError::TooLarge(problem));
         }
-        let mut texels = Vec::with_capacity(total);
-        let mut first = Vec::with_capacity(images.len());
-        for image in images {
-            first.push(texels.len() as u32);
-            match &image.texels {
-                Texels::Rgba8(t) => texels.extend(t.iter().map(|t| u32::from_le_bytes(*t))),
-                Texels::Rgba16(t) => {
-                    texels.extend(t.iter().map(|t| u32::from_le_bytes(t.map(|c| (u32::from(c) / 257) as u8))));
-                }
-            }
-        }
+        table.words.reserve_exact(total);
+        let placed: Vec<[u32; 2]> = images.iter().map(|i| table.add(&i.texels)).collect();
         let wrap = |w: Wrap| match w {
             Wrap::Repeat => 0,
             Wrap::ClampToEdge => CLAMP,
             Wrap::MirroredRepeat => MIRROR,
         };
-        let textures = textures
-            .iter()
-            .map(|t| {
-                let image = &images[t.image.index()];
-                let nearest = if t.filter == Filter::Nearest { NEAREST } else { 0 };
-                let flags = wrap(t.wrap_u) | (wrap(t.wrap_v) << WRAP_BITS) | nearest;
-                [first[t.image.index()], image.width, image.height, flags].map(f32::from_bits)
-            })
-            .collect();
-        Ok(Self { textures, texels, ..Self::default() })
+        for t in textures {
+            let (image, [first, packing]) = (&images[t.image.index()], placed[t.image.index()]);
+            let nearest = if t.filter == Filter::Nearest { NEAREST } else { 0 };
+            let flags = wrap(t.wrap_u) | (wrap(t.wrap_v) << WRAP_BITS) | nearest | packing;
+            table.textures.push([first, image.width, image.height, flags].map(f32::from_bits));
+        }
+        Ok(table)
+    }
+
+    /// Appends texels; where the first one is, and the flags that tell how they are kept.
+    fn add(&mut self, texels: &Texels) -> [u32; 2] {
+        let first = self.words.len() as u32;
+        let packing = match texels {
+            Texels::Rgba8(t) => {
+                self.words.extend(t.iter().map(|t| u32::from_le_bytes(*t)));
+                packing(8, 4, [0, 1, 2, 3])
+            }
+            Texels::Rgba16(t) => {
+                self.words.extend(t.iter().flat_map(|t| [word16([t[0], t[1]]), word16([t[2], t[3]])]));
+                packing(16, 4, [0, 1, 2, 3])
+            }
+            Texels::Few8(Few { values, kept, at }) => {
+                let (words, rest) = values.as_chunks::<4>();
+                self.words.extend(words.iter().map(|w| u32::from_le_bytes(*w)));
+                let rest: Vec<u32> = rest.iter().enumerate().map(|(i, &v)| u32::from(v) << (8 * i)).collect();
+                self.words.extend((!rest.is_empty()).then(|| rest.iter().sum::<u32>()));
+                packing(8, *kept, *at)
+            }
+            Texels::Few16(Few { values, kept, at }) => {
+                let (words, rest) = values.as_chunks::<2>();
+                self.words.extend(words.iter().map(|w| word16(*w)));
+                self.words.extend(rest.iter().map(|&v| u32::from(v)));
+                packing(16, *kept, *at)
+            }
+        };
+        self.has_packed |= packing & PACKED != 0;
+        self.has_wide |= matches!(texels, Texels::Rgba16(_));
+        [first, packing]
     }
 
     /// The binding of `wanted`, the same for the same; [`NO_TEXTURE`] for `None`.
     pub fn bind(&mut self, wanted: Option<TextureRef>) -> u32 {
         let Some(wanted) = wanted else { return NO_TEXTURE };
-        if let Some(known) = self.bindings.iter().position(|b| *b == wanted) {
-            return known as u32;
+        let bits = |m: [[f32; 3]; 2]| [m[0][0], m[0][1], m[0][2], m[1][0], m[1][1], m[1][2]].map(f32::to_bits);
+        let key = (wanted.texture.0, wanted.uv_set, wanted.transform.map(|t| bits(t.m)));
+        if let Some(&known) = self.bindings.get(&key) {
+            return known;
         }
+        let id = self.headers.len() as u32;
+        self.bindings.insert(key, id);
         let [first, width, height, flags] = self.textures[wanted.texture.index()];
-        let flags = f32::from_bits(flags.to_bits() | wanted.uv_set << UV_SET_SHIFT);
-        self.bindings.push(wanted);
+        let flags = f32::from_bits(flags.to_bits() | (wanted.uv_set & UV_SET_MASK) << UV_SET_SHIFT);
         self.headers.push([first, width, height, flags]);
         let m = wanted.transform.map_or([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], |t| t.m);
         self.transforms.extend(m.map(|[a, b, c]| [a, b, c, 0.0]));
         self.has_transforms |= wanted.transform.is_some();
-        (self.bindings.len() - 1) as u32
+        id
     }
 
     /// The coordinates at which binding `id` reads: its set, transformed.
@@ -129,7 +204,7 @@ impl TextureTable {
         let [first, width, height, flags] = id.records(&self.headers);
         let (first, flags) = (first.to_bits(), flags.to_bits());
         let (width, height) = (width.to_bits(), height.to_bits());
-        let [mut u, mut v] = uvs.get(flags.shr(UV_SET_SHIFT));
+        let [mut u, mut v] = uvs.get(flags.shr(UV_SET_SHIFT) & L::U::splat(UV_SET_MASK));
         if self.has_transforms {
             let row = id.min(L::U::splat(self.headers.len() as u32 - 1)).shl(1);
             let [a, b, c, _] = row.records(&self.transforms);
@@ -138,12 +213,32 @@ impl TextureTable {
         }
         let across = taps::<L>(u, width.to_float(), flags);
         let down = taps::<L>(v, height.to_float(), flags.shr(WRAP_BITS));
-        let row0 = first + down.first * width;
-        let row1 = first + down.second * width;
-        let t00 = self.texel::<L>(row0 + across.first, encoding);
-        let t10 = self.texel::<L>(row0 + across.second, encoding);
-        let t01 = self.texel::<L>(row1 + across.first, encoding);
-        let t11 = self.texel::<L>(row1 + across.second, encoding);
+        // Both ways give lanes of four bytes the same bits, so a lane does not depend on its neighbours.
+        if self.has_packed && flags.has(PACKED).any() {
+            let packing = Packing::<L>::new(flags);
+            return self.filtered::<L, true>(first, width, &across, &down, &packing, encoding);
+        }
+        let unused =
+            Packing::<L> { size: L::U::splat(0), at: [L::U::splat(0); 4], mask: L::U::splat(0), scale: L::F::zero() };
+        self.filtered::<L, false>(first, width, &across, &down, &unused, encoding)
+    }
+
+    #[inline(always)]
+    fn filtered<L: Lanes, const IS_PACKED: bool>(
+        &self,
+        first: L::U,
+        width: L::U,
+        across: &Taps<L>,
+        down: &Taps<L>,
+        packing: &Packing<L>,
+        encoding: Encoding,
+    ) -> Texel<L> {
+        let row0 = down.first * width;
+        let row1 = down.second * width;
+        let t00 = self.texel::<L, IS_PACKED>(first, row0 + across.first, packing, encoding);
+        let t10 = self.texel::<L, IS_PACKED>(first, row0 + across.second, packing, encoding);
+        let t01 = self.texel::<L, IS_PACKED>(first, row1 + across.first, packing, encoding);
+        let t11 = self.texel::<L, IS_PACKED>(first, row1 + across.second, packing, encoding);
         let (fx, fy) = (across.weight, down.weight);
         Texel {
             rgb: t00.rgb.lerp(t10.rgb, fx).lerp(t01.rgb.lerp(t11.rgb, fx), fy),
@@ -151,20 +246,77 @@ impl TextureTable {
         }
     }
 
+    /// Texel `i` of the images that start at words `first`.
     #[inline(always)]
-    fn texel<L: Lanes>(&self, i: L::U, encoding: Encoding) -> Texel<L> {
-        let t = i.gather_uint(&self.texels);
-        let byte = L::U::splat(255);
-        let scale = L::F::splat(1.0 / 255.0);
-        let r = (t & byte).to_float() * scale;
-        let g = (t.shr(8) & byte).to_float() * scale;
-        let b = (t.shr(16) & byte).to_float() * scale;
+    fn texel<L: Lanes, const IS_PACKED: bool>(
+        &self,
+        first: L::U,
+        i: L::U,
+        packing: &Packing<L>,
+        encoding: Encoding,
+    ) -> Texel<L> {
+        let [r, g, b, a] = if IS_PACKED {
+            let byte = i.shl_each(packing.size);
+            let word = first + byte.shr(2);
+            let low = word.gather_uint(&self.words).shr_each((byte & L::U::splat(3)).shl(3));
+            let mut high = low;
+            if self.has_wide {
+                high = (word + L::U::splat(1)).gather_uint(&self.words);
+            }
+            let [r, g, b, a] = packing.at;
+            [
+                channel::<L>(low, high, r, packing),
+                channel::<L>(low, high, g, packing),
+                channel::<L>(low, high, b, packing),
+                channel::<L>(low, high, a, packing),
+            ]
+        } else {
+            let t = (first + i).gather_uint(&self.words);
+            let byte = L::U::splat(255);
+            let scale = L::F::splat(1.0 / 255.0);
+            [
+                (t & byte).to_float() * scale,
+                (t.shr(8) & byte).to_float() * scale,
+                (t.shr(16) & byte).to_float() * scale,
+                t.shr(24).to_float() * scale,
+            ]
+        };
         let rgb = match encoding {
             Encoding::Srgb => V3::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b)),
             Encoding::Linear => V3::new(r, g, b),
         };
-        Texel { rgb, a: t.shr(24).to_float() * scale }
+        Texel { rgb, a }
     }
+}
+
+/// The channel that starts at bit `at` of a texel of one or two words.
+#[inline(always)]
+fn channel<L: Lanes>(low: L::U, high: L::U, at: L::U, packing: &Packing<L>) -> L::F {
+    let word = high.or_else(at.has(32), low);
+    (word.shr_each(at & L::U::splat(31)) & packing.mask).to_float() * packing.scale
+}
+
+fn word16(pair: [u16; 2]) -> u32 {
+    u32::from(pair[0]) | u32::from(pair[1]) << 16
+}
+
+/// Words that an image takes.
+fn words_of(texels: &Texels) -> usize {
+    match texels {
+        Texels::Rgba8(t) => t.len(),
+        Texels::Rgba16(t) => 2 * t.len(),
+        Texels::Few8(few) => few.values.len().div_ceil(4),
+        Texels::Few16(few) => few.values.len().div_ceil(2),
+    }
+}
+
+/// The flags of texels of `kept` channels (1, 2 or 4) of `bits` bits, of which R, G, B and A are number `at`.
+fn packing(bits: u32, kept: usize, at: [u8; 4]) -> u32 {
+    let size = (bits / 8 * kept as u32).ilog2();
+    let places = at.iter().enumerate().fold(0, |p, (k, &at)| p | u32::from(at) << (2 * k));
+    let deep = if bits == 16 { DEEP } else { 0 };
+    let is_packed = deep != 0 || kept != 4;
+    (if is_packed { PACKED } else { 0 }) | deep | size << SIZE_SHIFT | places << PLACES_SHIFT
 }
 
 /// Two neighbouring texels in one direction and the second one's weight.
@@ -215,119 +367,5 @@ pub fn srgb_to_linear<F: Float>(v: F) -> F {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::id::{ImageId, TextureId};
-    use simd::{Kernel, Level, dispatch};
-
-    struct Read<'a> {
-        table: &'a TextureTable,
-        u: f32,
-        v: f32,
-        encoding: Encoding,
-    }
-
-    impl Kernel for Read<'_> {
-        type Output = [f32; 4];
-
-        #[inline(always)]
-        fn run<L: Lanes>(self) -> [f32; 4] {
-            let uvs = UvSets::<L>::single(L::F::splat(self.u), L::F::splat(self.v));
-            let t = self.table.lookup::<L>(L::U::splat(0), &uvs, self.encoding);
-            let mut out = [[0.0; 16]; 4];
-            for (o, c) in out.iter_mut().zip([t.rgb.x, t.rgb.y, t.rgb.z, t.a]) {
-                c.store(o, 0);
-            }
-            out.map(|o| o[0])
-        }
-    }
-
-    fn table(wrap: Wrap, filter: Filter) -> TextureTable {
-        // 3 x 2 texels: red counts across, green counts down.
-        let texels = (0..6u8).map(|i| [i % 3 * 100, i / 3 * 200, 7, 255]).collect();
-        let image = Image { width: 3, height: 2, texels: Texels::Rgba8(texels), name: String::new() };
-        bound(
-            TextureTable::new(&[Texture { image: ImageId(0), wrap_u: wrap, wrap_v: wrap, filter }], &[image]).unwrap(),
-        )
-    }
-
-    fn bound(mut table: TextureTable) -> TextureTable {
-        table.bind(Some(TextureRef::plain(TextureId(0))));
-        table
-    }
-
-    fn read(t: &TextureTable, u: f32, v: f32) -> [f32; 4] {
-        let values: Vec<[f32; 4]> = [Level::Scalar, Level::Portable8, Level::Avx2, Level::Avx512]
-            .into_iter()
-            .filter(|l| l.is_available())
-            .map(|l| dispatch(l, Read { table: t, u, v, encoding: Encoding::Linear }))
-            .collect();
-        for v in &values {
-            assert!(v.iter().zip(&values[0]).all(|(a, b)| (a - b).abs() < 1e-6), "levels differ");
-        }
-        values[0].map(|v| v * 255.0)
-    }
-
-    #[test]
-    fn texel_centres_give_the_texel_and_row_0_is_at_the_top() {
-        for filter in [Filter::Nearest, Filter::Bilinear] {
-            let t = table(Wrap::Repeat, filter);
-            for (x, y) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1)] {
-                let got = read(&t, (x as f32 + 0.5) / 3.0, (y as f32 + 0.5) / 2.0);
-                assert!(
-                    (got[0] - x as f32 * 100.0).abs() < 1e-3 && (got[1] - y as f32 * 200.0).abs() < 1e-3,
-                    "{got:?}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn bilinear_blends_across_the_border_as_the_wrap_mode_says() {
-        let border = |wrap| read(&table(wrap, Filter::Bilinear), 0.0, 0.25)[0];
-        assert!((border(Wrap::Repeat) - 100.0).abs() < 1e-3);
-        assert!(border(Wrap::ClampToEdge).abs() < 1e-3);
-        assert!(border(Wrap::MirroredRepeat).abs() < 1e-3);
-    }
-
-    #[test]
-    fn coordinates_outside_the_unit_square_wrap() {
-        for (wrap, u, same_as) in [
-            (Wrap::Repeat, 1.4, 0.4),
-            (Wrap::Repeat, -0.3, 0.7),
-            (Wrap::MirroredRepeat, 1.4, 0.6),
-            (Wrap::MirroredRepeat, -0.3, 0.3),
-            (Wrap::MirroredRepeat, 2.2, 0.2),
-            (Wrap::ClampToEdge, 1.4, 1.0),
-            (Wrap::ClampToEdge, -9.0, 0.0),
-        ] {
-            let t = table(wrap, Filter::Bilinear);
-            assert!((read(&t, u, 0.3)[0] - read(&t, same_as, 0.3)[0]).abs() < 1e-2, "{wrap:?} {u}");
-        }
-    }
-
-    #[test]
-    fn unusable_coordinates_read_some_texel() {
-        for u in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30, -1e30] {
-            for wrap in [Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge] {
-                let got = read(&table(wrap, Filter::Bilinear), u, 0.3);
-                assert!(got.iter().all(|v| v.is_finite()), "{u} {wrap:?}: {got:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn srgb_bytes_decode_within_the_stated_error() {
-        for byte in 0..=255u8 {
-            let image = Image { width: 1, height: 1, texels: Texels::Rgba8(vec![[byte; 4]]), name: String::new() };
-            let sampler =
-                Texture { image: ImageId(0), wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, filter: Filter::Bilinear };
-            let table = bound(TextureTable::new(&[sampler], &[image]).unwrap());
-            let got = dispatch(Level::best(), Read { table: &table, u: 0.5, v: 0.5, encoding: Encoding::Srgb });
-            let v = f64::from(byte) / 255.0;
-            let exact = if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-            assert!((f64::from(got[0]) - exact).abs() <= 7e-6 * exact, "byte {byte}: {} for {exact}", got[0]);
-            assert!((f64::from(got[3]) - v).abs() < 1e-6);
-        }
-    }
-}
+#[path = "lookup_tests.rs"]
+mod tests;

@@ -1,8 +1,10 @@
 //! Image textures as described by the file. Lookups over N lanes are in [`lookup`].
 
 pub mod lookup;
+mod texels;
 
 use crate::id::{ImageId, TextureId};
+pub use texels::{Channels, Few, Texels};
 
 /// Decoded pixels, as encoded in the file (sRGB or linear is decided by the use, not here).
 #[derive(Clone, Debug)]
@@ -15,38 +17,6 @@ pub struct Image {
     pub texels: Texels,
     /// For messages: the image's name or JSON pointer.
     pub name: String,
-}
-
-/// R G B A of each pixel.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Texels {
-    /// 8 bits a channel.
-    Rgba8(Vec<[u8; 4]>),
-    /// 16 bits a channel.
-    Rgba16(Vec<[u16; 4]>),
-}
-
-impl Texels {
-    /// How many.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Rgba8(texels) => texels.len(),
-            Self::Rgba16(texels) => texels.len(),
-        }
-    }
-
-    /// None at all.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Texel `i` as encoded, each channel in [0, 1].
-    pub fn get(&self, i: usize) -> [f32; 4] {
-        match self {
-            Self::Rgba8(texels) => texels[i].map(|c| f32::from(c) / 255.0),
-            Self::Rgba16(texels) => texels[i].map(|c| f32::from(c) / 65535.0),
-        }
-    }
 }
 
 /// What happens outside [0, 1].
@@ -87,7 +57,7 @@ pub struct Texture {
 pub struct TextureRef {
     /// What is read.
     pub texture: TextureId,
-    /// Where: index into [`crate::shape::Mesh::uv_sets`], less than [`crate::math::MAX_UV_SETS`].
+    /// Where: index into `Mesh::uv_sets`, less than [`crate::math::MAX_UV_SETS`].
     pub uv_set: u32,
     /// Applied to the mesh's coordinates first (`KHR_texture_transform`); `None` = as they are.
     pub transform: Option<UvTransform>,

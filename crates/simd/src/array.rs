@@ -245,6 +245,16 @@ impl<const K: usize> Uint for U<K> {
     }
 
     #[inline(always)]
+    fn shl_each(self, by: Self) -> Self {
+        Self(from_fn(|i| self.0[i] << by.0[i]))
+    }
+
+    #[inline(always)]
+    fn shr_each(self, by: Self) -> Self {
+        Self(from_fn(|i| self.0[i] >> by.0[i]))
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(from_fn(|i| self.0[i].min(other.0[i])))
     }

@@ -328,6 +328,18 @@ impl Uint for U {
     }
 
     #[inline(always)]
+    fn shl_each(self, by: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_sllv_epi32(self.0, by.0)) }
+    }
+
+    #[inline(always)]
+    fn shr_each(self, by: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_srlv_epi32(self.0, by.0)) }
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm512_min_epu32(self.0, other.0)) }

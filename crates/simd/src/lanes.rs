@@ -159,6 +159,10 @@ pub trait Uint:
     fn shl(self, by: u32) -> Self;
     /// Shifted right; `by` < 32.
     fn shr(self, by: u32) -> Self;
+    /// Shifted left by as many bits as each lane of `by` says, each < 32.
+    fn shl_each(self, by: Self) -> Self;
+    /// Shifted right by as many bits as each lane of `by` says, each < 32.
+    fn shr_each(self, by: Self) -> Self;
     /// The smaller, unsigned.
     fn min(self, other: Self) -> Self;
     /// `==`

@@ -125,6 +125,9 @@ uint_op!(uint_sub, |a, b| a - b, u32::wrapping_sub);
 uint_op!(uint_mul, |a, b| a * b, u32::wrapping_mul);
 uint_op!(uint_logic, |a, b| (a & b) ^ (a | b), |a, b| (a & b) ^ (a | b));
 uint_op!(uint_shifts, |a, b| a.shl(7) ^ b.shr(9), |a, b| (a << 7) ^ (b >> 9));
+uint_op!(uint_shifts_of_each_lane, |a, b| a.shl_each(b.shl(27).shr(27)) ^ a.shr_each(b.shr(27)), |a, b| (a
+    << (b & 31))
+    ^ (a >> (b >> 27)));
 uint_op!(uint_min, |a, b| a.min(b), |a, b| a.min(b));
 uint_op!(uint_lt_is_unsigned, |a, b| a.or_else(a.lt(b), b), |a, b| if a < b { a } else { b });
 uint_op!(uint_reverse_bits, |a, _| a.reverse_bits(), |a, _| a.reverse_bits());

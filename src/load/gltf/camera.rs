@@ -1,7 +1,7 @@
-//! Perspective cameras.
+//! Perspective and orthographic cameras.
 
 use super::node::{Rigid, rigid};
-use super::{Loader, Result, extensions};
+use super::{Document, Loader, Result, extensions};
 use crate::camera::{Camera, Projection};
 use glam::DMat4;
 use gltf::json::Index;
@@ -22,18 +22,27 @@ pub(super) fn place(
     let found = doc.item(&doc.root.cameras, index, pointer, "cameras")?;
     let at = format!("/cameras/{}", index.value());
     if let Some(carried) = &found.extensions {
-        extensions::check_carried(doc, carried.others.keys(), &at, &[])?;
+        extensions::note_carried(doc, carried.others.keys(), &at, &[]);
     }
-    match found.type_ {
-        Checked::Valid(Type::Perspective) => {}
-        Checked::Valid(Type::Orthographic) => {
-            let fix = "Make it a perspective camera, or choose a scene without it.";
-            return Err(doc.not_built(format!("{at}/type"), "orthographic cameras are", fix));
-        }
+    let projection = match found.type_ {
+        Checked::Valid(Type::Perspective) => perspective(doc, found, &at)?,
+        Checked::Valid(Type::Orthographic) => orthographic(doc, found, &at)?,
         Checked::Invalid => {
-            return Err(doc.bad(&format!("{at}/type"), "is not a kind of camera", "Allowed: perspective."));
+            let fix = "Allowed: perspective, orthographic.";
+            return Err(doc.bad(&format!("{at}/type"), "is not a kind of camera", fix));
         }
-    }
+    };
+    let Rigid::Frame(world_from_camera) = rigid(&world) else {
+        let fix = "A scale of 0 along the camera's z leaves no direction to look in.";
+        return Err(doc.error(node_at, "the camera has no direction", fix));
+    };
+    let name = found.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| node_name.to_owned());
+    loader.cameras.insert(index.value());
+    loader.builder.add_camera(Camera { name, world_from_camera, projection });
+    Ok(())
+}
+
+fn perspective(doc: &Document, found: &Json, at: &str) -> Result<Projection> {
     let Some(perspective) = &found.perspective else {
         return Err(doc.error(at, "has no perspective", "A camera of type perspective needs it, with yfov."));
     };
@@ -47,13 +56,20 @@ pub(super) fn place(
         let fix = "Width over height must be positive; leave it out to take the picture's own.";
         return Err(doc.bad(&format!("{at}/perspective/aspectRatio"), "is out of range", fix));
     }
-    let Rigid::Frame(world_from_camera) = rigid(&world) else {
-        let fix = "A scale of 0 along the camera's z leaves no direction to look in.";
-        return Err(doc.error(node_at, "the camera has no direction", fix));
+    Ok(Projection::Perspective { yfov, aspect_ratio })
+}
+
+/// `znear` and `zfar` do not clip, so any value is taken.
+fn orthographic(doc: &Document, found: &Json, at: &str) -> Result<Projection> {
+    let Some(orthographic) = &found.orthographic else {
+        let fix = "A camera of type orthographic needs it, with xmag, ymag, znear and zfar.";
+        return Err(doc.error(at, "has no orthographic", fix));
     };
-    let name = found.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| node_name.to_owned());
-    let projection = Projection::Perspective { yfov, aspect_ratio };
-    loader.cameras.insert(index.value());
-    loader.builder.add_camera(Camera { name, world_from_camera, projection });
-    Ok(())
+    for (key, value) in [("xmag", orthographic.xmag), ("ymag", orthographic.ymag)] {
+        if !(value.is_finite() && value > 0.0) {
+            let fix = "Half of the width and half of the height of what is seen must be more than 0, in metres.";
+            return Err(doc.bad(&format!("{at}/orthographic/{key}"), "is out of range", fix));
+        }
+    }
+    Ok(Projection::Orthographic { xmag: f64::from(orthographic.xmag), ymag: f64::from(orthographic.ymag) })
 }

@@ -6,7 +6,8 @@ use crate::error::SourceLoc;
 use gltf::json::Root;
 use serde_json::Value;
 use serde_json::error::Category;
-use std::cell::OnceCell;
+use std::cell::{OnceCell, RefCell};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,8 @@ pub(super) struct Document {
     pub animations: usize,
     /// About the container.
     pub warnings: Vec<String>,
+    /// Extensions that reached objects carry and that are not read: first place, how many places.
+    pub ignored: RefCell<BTreeMap<String, (String, usize)>>,
     bytes: Vec<u8>,
     container: Container,
 }
@@ -51,7 +54,8 @@ impl Document {
         let uris = Resolver::new(file, asset_root)?;
         let buffers = root.buffers.iter().map(|_| OnceCell::new()).collect();
         let warnings = container.warnings.clone();
-        Ok(Self { file: file.to_owned(), root, uris, buffers, animations, warnings, bytes, container })
+        let ignored = RefCell::default();
+        Ok(Self { file: file.to_owned(), root, uris, buffers, animations, warnings, ignored, bytes, container })
     }
 
     /// The BIN chunk of a `.glb`.

@@ -1,20 +1,59 @@
-//! Which extensions are read, which may be ignored, and which are refused by name.
+//! Which extensions are read, and what is said of the others: an error if the file requires one, else a warning.
 
 use super::locate::shorten;
 use super::{Document, Loader, Result};
 
 /// Read.
-const READ: &[&str] = &["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular"];
+const READ: &[&str] = &[
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_unlit",
+    "KHR_texture_transform",
+];
 
 /// Without effect on a picture of the file as it is written.
 const WITHOUT_EFFECT: &[&str] = &[
+    "EXT_instance_features",
+    "EXT_mesh_features",
+    "EXT_mesh_manifold",
+    "EXT_structural_metadata",
+    "GODOT_single_root",
     "KHR_animation_pointer",
+    "KHR_audio_emitter",
+    "KHR_implicit_shapes",
     "KHR_interactivity",
     "KHR_materials_variants",
     "KHR_node_hoverability",
     "KHR_node_selectability",
+    "KHR_physics_rigid_bodies",
     "KHR_xmp",
     "KHR_xmp_json_ld",
+    "MSFT_lod",
+];
+
+/// Images in other formats, an alternative to the `source` of a texture: see `texture`.
+pub(super) const IMAGE_FORMATS: &[&str] = &["EXT_texture_avif", "KHR_texture_basisu", "MSFT_texture_dds"];
+
+/// Compressed vertices, an alternative to the data of the accessors unless the file requires them.
+const COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"];
+
+/// What a picture lacks without an extension that is known and not read.
+const LOSSES: &[(&str, &str)] = &[
+    ("EXT_lights_ies", "lights shine as if they had no profile"),
+    ("EXT_lights_image_based", "its environment gives no light"),
+    ("KHR_materials_anisotropy", "reflections are the same in all directions"),
+    ("KHR_materials_clearcoat", "surfaces have no coat"),
+    ("KHR_materials_diffuse_transmission", "surfaces let nothing through"),
+    ("KHR_materials_dispersion", "all colours are refracted alike"),
+    ("KHR_materials_iridescence", "surfaces have no thin film"),
+    ("KHR_materials_pbrSpecularGlossiness", "the metallic-roughness parameters are used instead"),
+    ("KHR_materials_sheen", "surfaces have no sheen"),
+    ("KHR_materials_transmission", "surfaces let nothing through"),
+    ("KHR_materials_volume", "nothing is absorbed inside of objects"),
+    ("PRT_shape", "the mesh is drawn instead"),
 ];
 
 /// Refuses what the file requires and we do not read.
@@ -29,35 +68,38 @@ pub(super) fn check_required(doc: &Document) -> Result<()> {
     Ok(())
 }
 
-/// Warns of extensions of which we do not know whether they change the picture.
-pub(super) fn warn_unknown(loader: &mut Loader) {
-    for name in &loader.doc.root.extensions_used {
-        if !refused(name) && !READ.contains(&name.as_str()) && !WITHOUT_EFFECT.contains(&name.as_str()) {
-            loader.builder.warn(format!("the extension {} is not known: ignored", shorten(name)));
-        }
-    }
-}
-
-/// Refuses an object that carries an extension of the kind that changes the picture; `names` are the extensions
-/// at `pointer` that were not read, `except` those that the caller looks after.
-pub(super) fn check_carried<'a>(
+/// Notes the extensions that a reached object carries and that are not read, for [`warn_ignored`]; `names` are the
+/// extensions at `pointer`, `except` those that the caller looks after.
+pub(super) fn note_carried<'a>(
     doc: &Document,
     names: impl Iterator<Item = &'a String>,
     pointer: &str,
     except: &[&str],
-) -> Result<()> {
-    for name in names {
-        if refused(name) && !WITHOUT_EFFECT.contains(&name.as_str()) && !except.contains(&name.as_str()) {
-            let fix = "It changes the picture, so it is not left out silently. Export without it.";
-            let problem = format!("the extension {} is not built yet", shorten(name));
-            return Err(doc.error(format!("{pointer}/extensions/{name}"), problem, fix));
-        }
+) {
+    for name in names.filter(|n| is_ignored(n) && !except.contains(&n.as_str())) {
+        let mut ignored = doc.ignored.borrow_mut();
+        ignored.entry(name.clone()).and_modify(|(_, n)| *n += 1).or_insert_with(|| (pointer.to_owned(), 1));
     }
-    Ok(())
 }
 
-/// Khronos' own extensions change the picture unless listed otherwise, as do ours and a few of several vendors.
-fn refused(name: &str) -> bool {
-    let prefix = ["KHR_", "PRT_", "EXT_lights_", "EXT_mesh_gpu_instancing"];
-    !READ.contains(&name) && prefix.iter().any(|p| name.starts_with(p))
+/// Warns once of each extension that is used and not read: of those that a reached object carries with their first
+/// place, and of those that only the file's list names.
+pub(super) fn warn_ignored(loader: &mut Loader) {
+    let doc = loader.doc;
+    let ignored = doc.ignored.borrow();
+    for (name, (first, count)) in ignored.iter() {
+        let more = if *count > 1 { format!(", first of {count} places") } else { String::new() };
+        let loss = LOSSES.iter().find(|(n, _)| n == name).map(|(_, loss)| format!(": {loss}")).unwrap_or_default();
+        loader.builder.warn(format!("{first}: the extension {} is not read{more}{loss}", shorten(name)));
+    }
+    for name in &doc.root.extensions_used {
+        let is_alternative = IMAGE_FORMATS.contains(&name.as_str()) || COMPRESSIONS.contains(&name.as_str());
+        if is_ignored(name) && !ignored.contains_key(name) && !is_alternative {
+            loader.builder.warn(format!("the extension {} is used somewhere and not read", shorten(name)));
+        }
+    }
+}
+
+fn is_ignored(name: &str) -> bool {
+    !READ.contains(&name) && !WITHOUT_EFFECT.contains(&name)
 }

@@ -3,8 +3,8 @@
 use super::document::{Document, read_file};
 use super::uri::Source;
 use super::{Loader, Result, name_or};
-use crate::image::decode::{self, Format};
-use crate::texture::{Image, Texels};
+use crate::image::decode::{self, Format, Pixels};
+use crate::texture::{Channels, Image, Texels};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -28,24 +28,21 @@ enum Bytes<'d> {
 pub(super) fn decode_all(loader: &mut Loader) -> Result<()> {
     let doc = loader.doc;
     let found: Vec<Encoded> = loader.textures.images.iter().map(|&i| find(doc, i)).collect::<Result<_>>()?;
+    let used = loader.builder.channels();
     // An error is made from its kind afterwards: a document is not shared between threads.
-    let decoded: Vec<_> = found.par_iter().map(decode_one).collect();
+    let decode = |(i, encoded)| decode_one(encoded, used.get(i).copied().unwrap_or_default());
+    let decoded: Vec<_> = found.par_iter().enumerate().map(decode).collect();
     for (encoded, result) in found.iter().zip(decoded) {
-        let (pixels, format) = result.map_err(|(problem, fix)| doc.error(&encoded.pointer, problem, fix))?;
-        let image = doc.root.images.get(encoded.index);
-        let name = name_or(image.and_then(|i| i.name.as_ref()), "images", encoded.index);
+        let (mut image, format) = result.map_err(|(problem, fix)| doc.error(&encoded.pointer, problem, fix))?;
+        let name = doc.root.images.get(encoded.index).and_then(|i| i.name.as_ref());
+        image.name = name_or(name, "images", encoded.index);
         if let Some(said) = Format::from_media_type(&encoded.media)
             && said != format
         {
             let text = format!("/images/{}: said to be {said} but is {format}: read as {format}", encoded.index);
             loader.builder.warn(text);
         }
-        loader.builder.add_image(Image {
-            width: pixels.width,
-            height: pixels.height,
-            texels: Texels::Rgba8(pixels.texels),
-            name,
-        });
+        loader.builder.add_image(image);
     }
     Ok(())
 }
@@ -84,13 +81,14 @@ fn find(doc: &Document, index: usize) -> Result<Encoded<'_>> {
     };
     // Other media types of data URIs (application/octet-stream) are common and say nothing.
     if media.starts_with("image/") && Format::from_media_type(&media).is_none() {
-        return Err(doc.error(media_at, format!("{media} is not built yet"), "Allowed: image/png, image/jpeg."));
+        let fix = "Allowed: image/png, image/jpeg, image/webp.";
+        return Err(doc.error(media_at, format!("{media} is not built yet"), fix));
     }
     Ok(Encoded { index, bytes, media, pointer })
 }
 
-/// Pixels and what the bytes turned out to be, or the problem and its remedy.
-fn decode_one(encoded: &Encoded) -> std::result::Result<(decode::Rgba8, Format), (String, String)> {
+/// The image without those channels that nothing uses, and what the bytes turned out to be; or the problem and its remedy.
+fn decode_one(encoded: &Encoded, used: Channels) -> std::result::Result<(Image, Format), (String, String)> {
     let file;
     let (bytes, source): (&[u8], String) = match &encoded.bytes {
         Bytes::Here(bytes) => (bytes, String::new()),
@@ -100,5 +98,12 @@ fn decode_one(encoded: &Encoded) -> std::result::Result<(decode::Rgba8, Format),
             (&file, format!("{name}: "))
         }
     };
-    decode::rgba8(bytes).map_err(|e| (format!("{source}{}", e.problem), e.fix.to_owned()))
+    let (decoded, format) = decode::rgba(bytes).map_err(|e| (format!("{source}{}", e.problem), e.fix.to_owned()))?;
+    let texels = match decoded.pixels {
+        Pixels::Rgba8(texels) => Texels::Rgba8(texels),
+        Pixels::Rgba16(texels) => Texels::Rgba16(texels),
+    };
+    let image =
+        Image { width: decoded.width, height: decoded.height, texels: texels.narrowed(used), name: String::new() };
+    Ok((image, format))
 }

@@ -48,7 +48,7 @@ pub(super) fn place(
 fn read(doc: &Document, found: &Json, at: &str) -> Result<Light> {
     if let Some(carried) = &found.extensions {
         let names: serde_json::Map<String, serde_json::Value> = serde_json::from_str(carried.get()).unwrap_or_default();
-        extensions::check_carried(doc, names.keys(), at, &[])?;
+        extensions::note_carried(doc, names.keys(), at, &[]);
     }
     let valid = |v: &f32| (0.0..=f32::MAX).contains(v);
     if !valid(&found.intensity) {

@@ -121,7 +121,7 @@ fn check_supported(loader: &Loader, primitive: &Primitive, at: &str) -> Result<(
         return Err(doc.not_built(format!("{at}/attributes/COLOR_0"), "vertex colours are", fix));
     }
     if let Some(carried) = &primitive.extensions {
-        extensions::check_carried(doc, carried.others.keys(), at, &["KHR_draco_mesh_compression"])?;
+        extensions::note_carried(doc, carried.others.keys(), at, &["KHR_draco_mesh_compression"]);
     }
     Ok(())
 }

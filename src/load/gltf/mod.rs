@@ -18,6 +18,7 @@ mod material;
 mod mesh;
 mod node;
 mod texture;
+mod texture_info;
 mod uri;
 
 use super::{LoadOptions, LoadTimes};
@@ -46,11 +47,11 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
 
     let mut loader = Loader::new(&doc, chosen.index);
     doc.warnings.iter().for_each(|w| loader.builder.warn(w));
-    extensions::warn_unknown(&mut loader);
     if let Some(warning) = &chosen.warning {
         loader.builder.warn(warning);
     }
     node::walk(&mut loader, &chosen.roots)?;
+    extensions::warn_ignored(&mut loader);
 
     let before = Instant::now();
     image::decode_all(&mut loader)?;

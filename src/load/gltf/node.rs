@@ -49,7 +49,7 @@ pub(super) fn choose_scene(doc: &Document, wanted: Option<&str>, parents: &[Opti
     let Some(scene) = scenes.get(index) else { return Err(doc.error("/scene", "no such scene", "")) };
     let at = format!("/scenes/{index}");
     if let Some(carried) = &scene.extensions {
-        extensions::check_carried(doc, carried.others.keys(), &at, &[])?;
+        extensions::note_carried(doc, carried.others.keys(), &at, &[]);
     }
     let mut roots = Vec::with_capacity(scene.nodes.len());
     let mut seen = vec![false; doc.root.nodes.len()];
@@ -124,7 +124,7 @@ fn place(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Result<()>
     let at = format!("/nodes/{i}");
     let name = name_or(node.name.as_ref(), "nodes", i);
     if let Some(carried) = &node.extensions {
-        extensions::check_carried(doc, carried.others.keys(), &at, &[])?;
+        extensions::note_carried(doc, carried.others.keys(), &at, &[]);
     }
     if let Some(index) = node.mesh {
         if let Some(skin) = node.skin {

@@ -1,11 +1,13 @@
 //! Textures: an image with its sampler.
 
+use super::locate::shorten;
 use super::{Loader, Result, extensions};
 use crate::scene::{ImageId, TextureId};
 use crate::texture::{Filter, Texture, Wrap};
 use gltf::json::Index;
 use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// How the `gltf` crate says that a texture has no `source`.
@@ -14,7 +16,7 @@ const NO_SOURCE: usize = u32::MAX as usize;
 /// Textures read so far, and the images that they need.
 #[derive(Debug, Default)]
 pub(super) struct Textures {
-    read: BTreeMap<usize, TextureId>,
+    read: BTreeMap<usize, Option<TextureId>>,
     /// glTF images in the order of our ids.
     pub images: Vec<usize>,
 }
@@ -35,34 +37,55 @@ impl Textures {
     }
 }
 
-/// The texture at `index`, read once; `pointer` is where the index was found.
-pub(super) fn read(loader: &mut Loader, index: Index<gltf::json::Texture>, pointer: &str) -> Result<TextureId> {
+/// The texture at `index`, read once; `pointer` is where the index was found. `None`, with a warning, if it has no image
+/// of a kind that is read.
+pub(super) fn read(loader: &mut Loader, index: Index<gltf::json::Texture>, pointer: &str) -> Result<Option<TextureId>> {
     if let Some(&done) = loader.textures.read.get(&index.value()) {
         return Ok(done);
     }
     let doc = loader.doc;
     let texture = doc.item(&doc.root.textures, index, pointer, "textures")?;
     let at = format!("/textures/{}", index.value());
-    let others = texture.extensions.iter().flat_map(|e| e.others.keys());
-    if texture.source.value() == NO_SOURCE {
-        let problem = match others.clone().next() {
-            None => "has no source".to_owned(),
-            Some(name) => format!("has no source but the extension {name}, which is not built yet"),
-        };
-        return Err(doc.error(at, problem, "Only PNG and JPEG images named by source are read."));
-    }
-    // Images in other formats are an alternative to the `source` that is there.
-    let alternatives = ["KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds"];
-    extensions::check_carried(doc, others, &at, &alternatives)?;
-    doc.item(&doc.root.images, texture.source, &format!("{at}/source"), "images")?;
-    let (wrap_u, wrap_v, filter) = match texture.sampler {
-        None => (Wrap::Repeat, Wrap::Repeat, Filter::Bilinear),
-        Some(index) => sampler(loader, index, &format!("{at}/sampler"))?,
+    let id = match source(loader, texture, &at)? {
+        None => None,
+        Some(image) => {
+            let (wrap_u, wrap_v, filter) = match texture.sampler {
+                None => (Wrap::Repeat, Wrap::Repeat, Filter::Bilinear),
+                Some(index) => sampler(loader, index, &format!("{at}/sampler"))?,
+            };
+            let image = loader.textures.image(image);
+            Some(loader.builder.add_texture(Texture { image, wrap_u, wrap_v, filter }))
+        }
     };
-    let image = loader.textures.image(texture.source.value());
-    let id = loader.builder.add_texture(Texture { image, wrap_u, wrap_v, filter });
     loader.textures.read.insert(index.value(), id);
     Ok(id)
+}
+
+/// The image of a texture: its WebP one if it has that, else its `source`.
+fn source(loader: &mut Loader, texture: &gltf::json::Texture, at: &str) -> Result<Option<usize>> {
+    const WEBP: &str = "EXT_texture_webp";
+    let doc = loader.doc;
+    let others = texture.extensions.as_ref().map(|e| &e.others);
+    if let Some(webp) = others.and_then(|o| o.get(WEBP)) {
+        let at = format!("{at}/extensions/{WEBP}/source");
+        let index = webp.get("source").and_then(Value::as_u64).and_then(|i| u32::try_from(i).ok());
+        let Some(index) = index else {
+            return Err(doc.bad(&at, "is not an index into images", "The extension has the index of a WebP image."));
+        };
+        doc.item(&doc.root.images, Index::<gltf::json::Image>::new(index), &at, "images")?;
+        return Ok(Some(index as usize));
+    }
+    let names = others.into_iter().flat_map(|o| o.keys());
+    if texture.source.value() != NO_SOURCE {
+        // Images in other formats are an alternative to the `source` that is there: nothing is lost.
+        extensions::note_carried(doc, names, at, extensions::IMAGE_FORMATS);
+        doc.item(&doc.root.images, texture.source, &format!("{at}/source"), "images")?;
+        return Ok(Some(texture.source.value()));
+    }
+    let names: Vec<String> = names.map(|n| shorten(n)).collect();
+    let but = if names.is_empty() { String::new() } else { format!(" but {}, which is not read", names.join(", ")) };
+    loader.builder.warn(format!("{at} has no source{but}: materials are drawn without this texture"));
+    Ok(None)
 }
 
 /// Wrapping and magnification; textures are always read at level 0, so the minification filter does not matter.

@@ -1,7 +1,8 @@
 //! The files that an OBJ and its MTL name: where they are looked for, and pictures decoded once each.
 
 use super::map::Map;
-use crate::image::{decode, old};
+use crate::image::decode::{self, Pixels};
+use crate::image::old;
 use crate::load::folders::{Folders, read_file};
 use crate::texture::Texels;
 use rayon::prelude::*;
@@ -139,9 +140,13 @@ fn decode(path: &Path) -> Result<Picture, String> {
         _ => None,
     };
     let decoded = match old {
-        Some(format) => old::rgba8(&bytes, format),
-        None => decode::rgba8(&bytes).map(|(pixels, _)| pixels),
+        Some(format) => old::rgba(&bytes, format),
+        None => decode::rgba(&bytes).map(|(pixels, _)| pixels),
     };
     let pixels = decoded.map_err(|e| format!("{}. {}", e.problem, e.fix))?;
-    Ok(Picture { width: pixels.width, height: pixels.height, texels: Texels::Rgba8(pixels.texels) })
+    let texels = match pixels.pixels {
+        Pixels::Rgba8(texels) => Texels::Rgba8(texels),
+        Pixels::Rgba16(texels) => Texels::Rgba16(texels),
+    };
+    Ok(Picture { width: pixels.width, height: pixels.height, texels })
 }
