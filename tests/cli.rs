@@ -161,6 +161,21 @@ fn one_bad_input_of_several_is_named_and_every_image_is_reported() {
 }
 
 #[test]
+fn a_scene_or_a_folder_that_is_not_there_says_which_are() {
+    let root = folder();
+    fs::write(root.path().join("a.gltf"), SCENE).unwrap();
+    refused(root.path(), &["a.gltf", "--scene", "Night"], 3, &["a.gltf: /scenes", "no scene \"Night\"", "Allowed: 0."]);
+    refused(root.path(), &["a.gltf", "--asset-root", "none"], 3, &["none"]);
+    let start = SCENE.find("data:application").expect("a data URI");
+    let end = start + SCENE[start..].find('"').expect("its end");
+    let outside = format!("{}../points.bin{}", &SCENE[..start], &SCENE[end..]);
+    fs::create_dir(root.path().join("sub")).unwrap();
+    fs::write(root.path().join("sub/a.gltf"), outside).unwrap();
+    fs::write(root.path().join("points.bin"), [0; 36]).unwrap();
+    refused(root.path(), &["sub/a.gltf"], 3, &["/buffers/0/uri", "../points.bin", "--asset-root"]);
+}
+
+#[test]
 fn same_stems_are_refused_with_the_name_that_tells_them_apart() {
     let root = folder();
     for sub in ["red", "blue"] {

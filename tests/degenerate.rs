@@ -130,9 +130,16 @@ fn geo_05_slivers_and_tiny_triangles_have_unit_normals_and_finite_densities() {
     let ready = prepared(&scene);
     let n = ready.tables.triangles.len() as u32;
     // What is left out is on a line: a third corner moved along it.
-    assert!(n > 3900, "{n} of 4004 are left: {:?}", ready.warnings);
+    assert!(n > 3900 && n as usize == scene.triangle_count(), "{n} of 4004 are left: {:?}", ready.warnings);
+    assert_eq!(ready.origin, DVec3::ZERO);
     for seen in read(&ready, &(0..n).map(|i| (i, 0.3, 0.3)).collect::<Vec<_>>()) {
         assert!((seen.ng.length() - 1.0).abs() < 1e-6 && seen.point.is_finite(), "{seen:?}");
+        // Nothing was dropped once placed and the origin stayed, so corners are as written and f64 has their normal.
+        let mesh = &scene.meshes[0];
+        let [a, b, c] =
+            mesh.indices[seen.primitive as usize].map(|i| Vec3::from(mesh.positions[i as usize]).as_dvec3());
+        let off = seen.ng.cross((b - a).cross(c - a).normalize()).length();
+        assert!(off < 1e-6, "{off} rad: {a} {b} {c}");
         assert!(seen.light_density.is_finite() && seen.offset.is_finite() && seen.offset >= 0.0, "{seen:?}");
     }
     let frame = picture(&mut scene);

@@ -64,8 +64,11 @@ mod tests {
                     [0.00038527316, 0.00038460016, -0.999_999_9],
                     [-0.00019813581, -0.00008946839, -0.99999994],
                 ];
-                for i in 0..2000 {
-                    let (a, z) = (i as f32 * 2.399_963_2, 1.0 - (i as f32 + 0.5) / 1000.0);
+                // All over the sphere, and the 32 numbers next to -1, where the sum in the denominator cancels.
+                let all_over = (0..20_000).map(|i| 1.0 - (i as f32 + 0.5) / 10_000.0);
+                let near_pole = (1..=32).map(|i| -1.0 + i as f32 * 2f32.powi(-24));
+                for (i, z) in all_over.chain(near_pole).enumerate() {
+                    let a = i as f32 * 2.399_963_2;
                     let r = (1.0 - z * z).sqrt();
                     vectors.push([r * a.cos(), r * a.sin(), z]);
                 }

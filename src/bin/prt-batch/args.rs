@@ -37,7 +37,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render (the same as without a command).
-    Render(RenderArgs),
+    Render(Box<RenderArgs>),
     /// Error metrics of pictures against a reference, of files or of folders.
     Compare(CompareArgs),
 }
