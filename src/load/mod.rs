@@ -1,6 +1,7 @@
 //! Files to [`Scene`]s, by extension.
 
 pub mod gltf;
+mod tangents;
 
 use crate::error::{LoadError, SourceLoc};
 use crate::scene::Scene;

@@ -4,7 +4,14 @@ use super::locate::shorten;
 use super::{Document, Loader, Result};
 
 /// Read.
-const READ: &[&str] = &["KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_specular"];
+const READ: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_specular",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+];
 
 /// Without effect on a picture of the file as it is written.
 const WITHOUT_EFFECT: &[&str] = &[
