@@ -17,8 +17,8 @@ const LARGEST: f32 = 1e18;
 const STACK_PER_TRIANGLE: usize = 1 << 10;
 /// Enough for everything else in that thread.
 const STACK: usize = 1 << 20;
-/// Triangles around one vertex that are still tried: 512 MiB of (untouched) stack.
-const MAX_AROUND_VERTEX: usize = 1 << 19;
+/// Triangles around one vertex that are still tried: MikkTSpace compares each with each.
+const MAX_AROUND_VERTEX: usize = 1 << 13;
 
 /// So many triangles meet in one vertex that MikkTSpace was not tried; the tangents are any across the normals.
 #[derive(Debug)]
@@ -27,11 +27,7 @@ pub(super) struct TooManyTriangles(pub usize);
 /// Gives `mesh` tangents along u of its set `uv_set`, with `transform` (that of the normal map) applied. Meshes without
 /// normals get flat ones first. Vertices are split where corners differ, and only there; unused vertices go.
 /// Each tangent is of length 1 and across its normal, also where the coordinates say nothing: any direction then.
-pub(super) fn generate(
-    mesh: &mut Mesh,
-    uv_set: usize,
-    transform: Option<UvTransform>,
-) -> Result<(), TooManyTriangles> {
+pub(super) fn generate(mesh: &mut Mesh, uv_set: usize, transform: Option<UvTransform>) -> Result<(), TooManyTriangles> {
     let uvs = mesh.uv_sets.get(uv_set).map(|uvs| transformed(uvs, transform));
     let corner_normals: Vec<Vec3> = corner_normals(mesh);
     let mut result = Ok(());

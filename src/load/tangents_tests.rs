@@ -126,8 +126,7 @@ fn degenerate_positions_and_normals_still_give_a_frame() {
 fn tangents_of_the_file_are_repaired_only_where_they_cannot_serve() {
     let mut mesh = square(UPRIGHT);
     let kept = [0.6, 0.0, 0.1, -1.0];
-    mesh.tangents =
-        Some(vec![kept, [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 3.0, -1.0], [f32::NAN, 0.0, 0.0, f32::NAN]]);
+    mesh.tangents = Some(vec![kept, [0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 3.0, -1.0], [f32::NAN, 0.0, 0.0, f32::NAN]]);
     assert_eq!(repair(&mut mesh), 3);
     assert_eq!(mesh.tangents.as_ref().unwrap()[0], kept);
     mesh.tangents.as_mut().unwrap().remove(0);
@@ -136,16 +135,24 @@ fn tangents_of_the_file_are_repaired_only_where_they_cannot_serve() {
     assert_frames(&mesh);
 }
 
-#[test]
-fn fan_of_many_triangles_around_one_vertex_does_not_exhaust_the_stack() {
-    let n = 40_000;
+/// A disc of `n` triangles around vertex 0.
+fn disc(n: u32) -> Mesh {
     let mut mesh = square(UPRIGHT);
     let turn = |i: u32| std::f32::consts::TAU * i as f32 / n as f32;
     mesh.positions = std::iter::once([0.0; 3]).chain((0..n).map(|i| [turn(i).cos(), turn(i).sin(), 0.0])).collect();
     mesh.uv_sets = vec![mesh.positions.iter().map(|p| [p[0], p[1]]).collect()];
     mesh.normals = Some(vec![[0.0, 0.0, 1.0]; n as usize + 1]);
     mesh.indices = (0..n).map(|i| [0, 1 + i, 1 + (i + 1) % n]).collect();
+    mesh
+}
+
+#[test]
+fn many_triangles_around_one_vertex_exhaust_neither_stack_nor_patience() {
+    let mut mesh = disc(2_000);
     generate(&mut mesh, 0, None).unwrap();
     assert_frames(&mesh);
-    assert_eq!(mesh.positions.len(), n as usize + 1);
+    assert_eq!(mesh.positions.len(), 2_001);
+    let mut mesh = disc(20_000);
+    assert!(matches!(generate(&mut mesh, 0, None), Err(TooManyTriangles(20_000))));
+    assert_frames(&mesh);
 }

@@ -84,14 +84,15 @@ fn check_type(doc: &Document, accessor: &Accessor, at: &str, wanted: &Wanted) ->
     if wanted.core.contains(&kind) {
         return Ok((kind, shape.multiplicity()));
     }
+    let quantized = if doc.uses("KHR_mesh_quantization") { wanted.quantized } else { &[] };
+    if quantized.contains(&kind) {
+        return Ok((kind, shape.multiplicity()));
+    }
     if wanted.quantized.contains(&kind) {
-        if doc.uses("KHR_mesh_quantization") {
-            return Ok((kind, shape.multiplicity()));
-        }
         let hint = "This type needs KHR_mesh_quantization, which extensionsUsed does not list.";
         return Err(doc.bad(&component_at, &format!("as {name}"), format!("{fix} {hint}")));
     }
-    if wanted.core.iter().chain(wanted.quantized).any(|k| k.component == component) {
+    if wanted.core.iter().chain(quantized).any(|k| k.component == component) {
         return Err(doc.error(format!("{at}/normalized"), format!("{} as {name}", accessor.normalized), fix));
     }
     Err(doc.bad(&component_at, &format!("as {name}"), fix))
@@ -200,13 +201,17 @@ impl Elements<'_> {
     pub fn floats<const N: usize>(&self) -> Result<Vec<[f32; N]>> {
         let kind = self.kind;
         let is_float = kind.component == ComponentType::F32;
-        self.read([0.0; N], |e| kind.floats(e), |packed, out| {
-            if is_float {
-                let (words, _) = packed.as_chunks::<4>();
-                out.extend(words.as_chunks::<N>().0.iter().map(|e| e.map(f32::from_le_bytes)));
-            }
-            is_float
-        })
+        self.read(
+            [0.0; N],
+            |e| kind.floats(e),
+            |packed, out| {
+                if is_float {
+                    let (words, _) = packed.as_chunks::<4>();
+                    out.extend(words.as_chunks::<N>().0.iter().map(|e| e.map(f32::from_le_bytes)));
+                }
+                is_float
+            },
+        )
     }
 
     /// `[count]` colours; those without alpha get 1.
@@ -220,16 +225,20 @@ impl Elements<'_> {
     /// `[count]` unsigned integers.
     pub fn indices(&self) -> Result<Vec<u32>> {
         let component = self.kind.component;
-        self.read(0, |e| unsigned(component, e), |packed, out| {
-            match component {
-                ComponentType::U8 => out.extend(packed.iter().map(|&b| u32::from(b))),
-                ComponentType::U16 => {
-                    out.extend(packed.as_chunks::<2>().0.iter().map(|b| u32::from(u16::from_le_bytes(*b))));
+        self.read(
+            0,
+            |e| unsigned(component, e),
+            |packed, out| {
+                match component {
+                    ComponentType::U8 => out.extend(packed.iter().map(|&b| u32::from(b))),
+                    ComponentType::U16 => {
+                        out.extend(packed.as_chunks::<2>().0.iter().map(|b| u32::from(u16::from_le_bytes(*b))));
+                    }
+                    _ => out.extend(packed.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b))),
                 }
-                _ => out.extend(packed.as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b))),
-            }
-            true
-        })
+                true
+            },
+        )
     }
 
     /// The greatest value that the type of indices can hold: where strips would start anew.

@@ -8,9 +8,9 @@ use crate::error::SourceLoc;
 use gltf::json::Root;
 use serde_json::Value;
 use serde_json::error::Category;
-use std::sync::OnceLock;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// A parsed file. Nothing in `root` is validated yet: look things up with `Document::item`.
 pub(super) struct Document {

@@ -48,11 +48,8 @@ pub(super) fn read(loader: &mut Loader, extension: &Value, at: &str) -> Result<V
         let [sx, sy, sz, _] = element(&scales, i, [1.0; 4]);
         let length = rotation.length();
         // Bytes and shorts are not of length 1 to more than two or four digits.
-        let matrix = DMat4::from_scale_rotation_translation(
-            DVec3::new(sx, sy, sz),
-            rotation / length,
-            DVec3::new(x, y, z),
-        );
+        let matrix =
+            DMat4::from_scale_rotation_translation(DVec3::new(sx, sy, sz), rotation / length, DVec3::new(x, y, z));
         if length == 0.0 || !matrix.is_finite() {
             let fix = "Translations and scales must be finite, rotations quaternions of length 1.";
             return Err(doc.error(format!("{at}/attributes"), format!("instance {i} has no transform"), fix));

@@ -102,7 +102,8 @@ fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, map: &crate::tex
             loader.builder.warn(text);
         }
     } else if let Err(tangents::TooManyTriangles(n)) = tangents::generate(mesh, map.uv_set as usize, map.transform) {
-        let text = format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
+        let text =
+            format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
         loader.builder.warn(text);
     }
 }
@@ -157,14 +158,7 @@ fn triangles(
 }
 
 /// Every index must be one of the `n` vertices, and none the value `restart`.
-fn check_indices(
-    loader: &Loader,
-    indices: &[u32],
-    n: usize,
-    restart: u32,
-    accessor: usize,
-    at: &str,
-) -> Result<()> {
+fn check_indices(loader: &Loader, indices: &[u32], n: usize, restart: u32, accessor: usize, at: &str) -> Result<()> {
     let greatest = indices.par_chunks(1 << 16).map(|c| c.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
     if (greatest as usize) < n && greatest < restart || indices.is_empty() {
         return Ok(());

@@ -64,8 +64,7 @@ pub(super) const MORPH_POSITION: Wanted =
 /// Displacements of normals.
 pub(super) const MORPH_NORMAL: Wanted = wanted("NORMAL", &[Type::Vec3], &[F32], &[I8N, I16N], "VEC3 of float (5126)");
 /// Displacements of tangents, without handedness.
-pub(super) const MORPH_TANGENT: Wanted =
-    wanted("TANGENT", &[Type::Vec3], &[F32], &[I8N, I16N], "VEC3 of float (5126)");
+pub(super) const MORPH_TANGENT: Wanted = wanted("TANGENT", &[Type::Vec3], &[F32], &[I8N, I16N], "VEC3 of float (5126)");
 /// Vertex indices.
 pub(super) const INDICES: Wanted = wanted(
     "indices",

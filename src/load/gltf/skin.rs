@@ -163,11 +163,14 @@ fn deform(mesh: &mut Mesh, moves: &[DMat4]) {
     });
     let mirrors = |m: &DMat4| DMat3::from_mat4(*m).determinant() < 0.0;
     if let Some(normals) = &mut mesh.normals {
-        normals.par_iter_mut().zip(moves).for_each(|(n, m)| {
+        normals.par_iter_mut().zip(moves).for_each(|(normal, m)| {
             let (x, y, z) = (m.x_axis.truncate(), m.y_axis.truncate(), m.z_axis.truncate());
             // By cofactors, as instances are: no division, so a squashed joint stays finite.
             let cofactor = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y)) * if mirrors(m) { -1.0 } else { 1.0 };
-            *n = (cofactor * vector(*n)).normalize_or_zero().as_vec3().to_array();
+            let n = vector(*normal);
+            // Joints that turn against each other can squash a vertex to a line, which has no cofactors.
+            let moved = (cofactor * n).try_normalize().unwrap_or_else(|| m.transform_vector3(n).normalize_or_zero());
+            *normal = moved.as_vec3().to_array();
         });
     }
     if let Some(tangents) = &mut mesh.tangents {
