@@ -10,6 +10,7 @@ import json
 import math
 import struct
 import sys
+import zlib
 from pathlib import Path
 
 JSON, BIN = 0x4E4F534A, 0x004E4942
@@ -40,7 +41,7 @@ def big(path, megabytes):
     root = {
         "asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
         "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
-        "textures": [{"source": 0}], "images": [{"uri": "data:image/png;base64," + PIXEL}],
+        "textures": [{"source": 0}], "images": [{"uri": "data:image/png;base64," + pixel()}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2}, "indices": 3,
                                     "material": 0}]}],
         "accessors": [accessor(0, 5126, "VEC3", n), accessor(1, 5126, "VEC3", n), accessor(2, 5126, "VEC2", n),
@@ -68,8 +69,14 @@ def nodes(path, count):
     path.write_text(json.dumps(root))
 
 
-# One white pixel.
-PIXEL = ("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsKkdZQAAAABJRU5ErkJggg==")
+def pixel():
+    """A PNG of one white pixel, base64."""
+    chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data
+                                + struct.pack(">I", zlib.crc32(kind + data)))
+    header = struct.pack(">IIBBBBB", 1, 1, 8, 0, 0, 0, 0)
+    png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"\0\xff"))
+    return base64.b64encode(png + chunk(b"IEND", b"")).decode()
+
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])

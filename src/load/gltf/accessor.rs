@@ -88,14 +88,15 @@ fn check_type(doc: &Document, accessor: &Accessor, at: &str, wanted: &Wanted) ->
     if quantized.contains(&kind) {
         return Ok((kind, shape.multiplicity()));
     }
-    if wanted.quantized.contains(&kind) {
-        let hint = "This type needs KHR_mesh_quantization, which extensionsUsed does not list.";
-        return Err(doc.bad(&component_at, &format!("as {name}"), format!("{fix} {hint}")));
-    }
+    let hint = match wanted.quantized.contains(&kind) {
+        true => " This type needs KHR_mesh_quantization, which extensionsUsed does not list.",
+        false => "",
+    };
     if wanted.core.iter().chain(quantized).any(|k| k.component == component) {
-        return Err(doc.error(format!("{at}/normalized"), format!("{} as {name}", accessor.normalized), fix));
+        let problem = format!("{} as {name}", accessor.normalized);
+        return Err(doc.error(format!("{at}/normalized"), problem, fix + hint));
     }
-    Err(doc.bad(&component_at, &format!("as {name}"), fix))
+    Err(doc.bad(&component_at, &format!("as {name}"), fix + hint))
 }
 
 /// Where the elements of an accessor with a buffer view are, and how far apart; `size` is that of an element and of a
