@@ -1,7 +1,7 @@
 //! The unit square and its degenerations.
 
 use super::*;
-use crate::id::MaterialId;
+use crate::scene::MaterialId;
 
 fn square(uvs: [[f32; 2]; 4]) -> Mesh {
     Mesh {
