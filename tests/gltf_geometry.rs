@@ -201,6 +201,12 @@ fn restart_values_and_bad_sparse_data_are_refused_by_place() {
         assert_eq!(error.at.place, format!("{PRIMITIVE}/indices"));
         assert!(error.problem.contains("255: the primitive restart value"), "{error}");
     }
+    // Also where there are so many vertices that the value could be meant.
+    let mut large = sample.clone().remove("/meshes/0/primitives/0/material");
+    let positions = large.add_accessor(&floats(&[1.0; 900]), 5126, "VEC3", 300);
+    let large =
+        large.set(ATTRIBUTES, json!({"POSITION": positions})).set(&format!("{PRIMITIVE}/indices"), json!(index));
+    assert!(large.error().problem.contains("255: the primitive restart value"));
     let indices = sample.add_view(&[1, 1, 9, 0]);
     let sparse = |count: u64, offset: u64, component: u32| {
         json!({"count": count, "values": {"bufferView": 0},

@@ -100,7 +100,7 @@ fn skinned() -> Sample {
     let joints =
         sample.add_accessor(&[[0, 9, 0, 0], [0, 9, 0, 0], [1, 9, 0, 0], [1, 0, 0, 0]].concat(), 5121, "VEC4", 4);
     // Not of sum 1; the fourth corner is half and half. Joint 9 does not exist, but has no weight.
-    let weights = [[2.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]];
+    let weights = [[1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]];
     let weights = sample.add_accessor(&floats(&weights.concat()), 5126, "VEC4", 4);
     let mut inverse = DMat4::IDENTITY.to_cols_array().map(|v| v as f32).to_vec();
     inverse.extend(DMat4::from_translation(DVec3::new(0.0, -1.0, 0.0)).to_cols_array().map(|v| v as f32));
