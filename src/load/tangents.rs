@@ -57,7 +57,8 @@ pub(super) fn repair(mesh: &mut Mesh) -> usize {
     replaced
 }
 
-/// The part of `tangent` across `normal`, of length 1, and `true`; any direction across it, and `false`, if there is none.
+/// The part of `tangent` across `normal`, of length 1, and `true`; if there is none, any direction across it, and
+/// `false`.
 fn across(normal: Vec3, tangent: [f32; 4]) -> ([f32; 4], bool) {
     let n = normal.try_normalize().filter(|n| n.is_finite()).unwrap_or(Vec3::Z);
     let w = if tangent[3] < 0.0 { -1.0 } else { 1.0 };

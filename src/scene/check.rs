@@ -54,9 +54,9 @@ fn check_mesh(mesh: &mut Mesh) -> Found {
     Found { unusable, flat, uvs: clean_uvs(mesh), colors: clean_colors(mesh) }
 }
 
-/// Drops instances whose transform squashes everything to a line or a point, so that no triangle has an area: a scale of
-/// 0 is how some files hide things, and their place must not count in the scene's bounds. What is squashed to a plane
-/// stays: triangles in that plane can be seen, and `render::prepare` drops the others one by one.
+/// Drops instances whose transform squashes everything to a line or a point, so that no triangle has an area: a scale
+/// of 0 is how some files hide things, and their place must not count in the scene's bounds. What is squashed to a
+/// plane stays: triangles in that plane can be seen, and `render::prepare` drops the others one by one.
 fn drop_instances(scene: &mut Scene) {
     let mut squashed = Tally::default();
     scene.instances.retain(|instance| {

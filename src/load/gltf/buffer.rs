@@ -1,5 +1,6 @@
 //! Buffers and buffer views: found and measured first, read range by range when something that is drawn needs them.
-//! Reads are positioned reads of files, not memory maps: a file that another process cuts short is an error, not a signal.
+//! Reads are positioned reads of files, not memory maps: a file that another process cuts short is an error, not a
+//! signal.
 
 use super::Result;
 use super::container::open_file;

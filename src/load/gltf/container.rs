@@ -1,5 +1,5 @@
-//! The `.glb` container and bare JSON (glTF 2.0 specification, section 4.4). Only the JSON is read here; of the BIN chunk
-//! the place is noted, and its bytes are read when something that is drawn needs them.
+//! The `.glb` container and bare JSON (glTF 2.0 specification, section 4.4). Only the JSON is read here; of the BIN
+//! chunk the place is noted, and its bytes are read when something that is drawn needs them.
 
 use super::{LoadError, Result};
 use crate::error::SourceLoc;

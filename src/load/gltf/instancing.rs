@@ -9,8 +9,8 @@ use serde_json::Value;
 /// The extension's name.
 pub(super) const NAME: &str = "EXT_mesh_gpu_instancing";
 
-/// The transforms of the instances, relative to the node; `at` is the extension's place. Attributes other than the three
-/// of the extension are for shaders of the exporter's own: ignored.
+/// The transforms of the instances, relative to the node; `at` is the extension's place. Attributes other than the
+/// three of the extension are for shaders of the exporter's own: ignored.
 pub(super) fn read(loader: &mut Loader, extension: &Value, at: &str) -> Result<Vec<DMat4>> {
     let doc = loader.doc;
     let attributes = extension.get("attributes").and_then(Value::as_object);

@@ -11,8 +11,8 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use rayon::prelude::*;
 
-/// Reads a primitive, found at `at` in the mesh `name`, in a pose; `weights` are those of its morph targets (empty = all
-/// 0). `None` if it has no triangles.
+/// Reads a primitive, found at `at` in the mesh `name`, in a pose; `weights` are those of its morph targets (empty =
+/// all 0). `None` if it has no triangles.
 pub(super) fn read(
     loader: &mut Loader,
     primitive: &Primitive,
