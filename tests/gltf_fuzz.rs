@@ -54,8 +54,7 @@ fn damage(bytes: &[u8], random: &mut Lcg) -> Vec<u8> {
 
 fn storm(name: &str, damaged: &str, original: &[u8], seed: u64) {
     let dir = TempDir::new().unwrap();
-    let sample = Sample::new();
-    sample.write(dir.path());
+    rich().write(dir.path());
     let mut random = Lcg(seed);
     let (mut loaded, mut slowest) = (0, 0.0_f64);
     for round in 0..3000 {
@@ -73,19 +72,53 @@ fn storm(name: &str, damaged: &str, original: &[u8], seed: u64) {
     assert!(slowest < 2.0, "{slowest} s");
 }
 
+/// The sample with one of each form of geometry: a sparse strip of bytes with colours, instanced and morphed, without
+/// tangents, below a hidden and a shown node; and a skin.
+fn rich() -> Sample {
+    let mut s = Sample::new();
+    let places = s.add_view(&[1, 0, 2, 0]);
+    let values = s.add_view(&[1, 2, 3, 0, 4, 5, 6, 0]);
+    let sparse = json!({"count": 2, "indices": {"bufferView": places, "componentType": 5123},
+        "values": {"bufferView": values}});
+    let positions = s.add(json!({"componentType": 5120, "type": "VEC3", "count": 4, "sparse": sparse}));
+    let bytes = s.add_accessor(&[0, 1, 1, 0, 0, 0, 1, 0, 1, 0, 0, 1, 0, 1, 0, 0], 5121, "VEC4", 4);
+    let weights = s.add_accessor(&[255, 128, 0, 0].repeat(4), 5121, "VEC4", 4);
+    s.json["accessors"][weights]["normalized"] = json!(true);
+    let strip = s.add_accessor(&[0, 1, 3, 2, 2, 1], 5121, "SCALAR", 6);
+    let places = s.add_accessor(&gltf_support::floats(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), 5126, "VEC3", 2);
+    let attributes = json!({"POSITION": positions, "NORMAL": 1, "TEXCOORD_0": 2, "COLOR_0": weights,
+        "JOINTS_0": bytes, "WEIGHTS_0": weights});
+    let primitive = json!({"attributes": attributes, "indices": strip, "mode": 5, "material": 0,
+        "targets": [{"POSITION": 0}]});
+    let instancing = json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places, "SCALE": places}}});
+    s.set("/extensionsUsed/-", json!("KHR_mesh_quantization"))
+        .set("/meshes/-", json!({"primitives": [primitive.clone(), primitive], "weights": [0.5]}))
+        .set("/skins", json!([{"joints": [0, 1]}]))
+        .set("/nodes/0/extensions", json!({"KHR_node_visibility": {"visible": true}}))
+        .set("/nodes/-", json!({"mesh": 1, "extensions": instancing}))
+        .set("/nodes/-", json!({"mesh": 1, "skin": 0, "weights": [0.25]}))
+        .set("/scenes/0/nodes", json!([0, 1, 2, 3, 4]))
+}
+
+#[test]
+fn rich_sample_is_sound() {
+    let scene = rich().load().unwrap();
+    assert_eq!((scene.instances.len(), scene.meshes.len()), (1 + 4 + 2, 1 + 2 + 2));
+}
+
 #[test]
 fn damaged_json_never_panics() {
-    storm("scene.gltf", "scene.gltf", Sample::new().json.to_string().as_bytes(), 1);
+    storm("scene.gltf", "scene.gltf", rich().json.to_string().as_bytes(), 1);
 }
 
 #[test]
 fn damaged_glb_never_panics() {
-    storm("scene.glb", "scene.glb", &Sample::new().glb(), 2);
+    storm("scene.glb", "scene.glb", &rich().glb(), 2);
 }
 
 #[test]
 fn damaged_buffers_and_images_never_panic() {
-    storm("scene.gltf", "scene.bin", &Sample::new().bin, 3);
+    storm("scene.gltf", "scene.bin", &rich().bin, 3);
 }
 
 /// JSON pointers of every value.
@@ -100,8 +133,8 @@ fn places(value: &Value, path: &str, out: &mut Vec<String>) {
 
 #[test]
 fn well_formed_json_with_wild_values_never_panics() {
-    let sample = Sample::new().set("/buffers/0/uri", json!("data:;base64,"));
-    let bytes = Sample::new().bin;
+    let sample = rich();
+    let bytes = sample.bin.clone();
     let uri = format!("data:;base64,{}", gltf_support::base64(&bytes));
     let sample = sample.set("/buffers/0/uri", json!(uri));
     let wild = [

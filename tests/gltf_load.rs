@@ -295,6 +295,7 @@ fn every_asset_in_the_shared_folder_loads_or_says_why_not() {
                 files += 1;
                 if let Err(error) = load(&path, &LoadOptions::default()) {
                     assert!(!error.problem.is_empty() && error.at.file == path, "{error}");
+                    assert!(!error.at.place.is_empty() || error.problem.contains("is empty"), "{error}");
                 }
             }
         }

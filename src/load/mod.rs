@@ -3,6 +3,7 @@
 mod folders;
 pub mod gltf;
 pub mod obj;
+mod tangents;
 
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};

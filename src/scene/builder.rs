@@ -53,6 +53,14 @@ impl SceneBuilder {
         used
     }
 
+    /// A material that was added.
+    ///
+    /// # Panics
+    /// When the id is of another builder.
+    pub fn material(&self, id: MaterialId) -> &Material {
+        &self.scene.materials[id.index()]
+    }
+
     /// Places a mesh.
     pub fn add_instance(&mut self, instance: Instance) {
         self.scene.instances.push(instance);

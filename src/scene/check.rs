@@ -3,33 +3,50 @@
 use super::Scene;
 use crate::math::MAX_UV_SETS;
 use crate::shape::Mesh;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 /// Coordinates beyond this are dropped: Embree ignores such triangles without a word
 /// (`rtcCommitScene`: "|value| > 1.844e18"), so both backends must.
 pub(crate) const MAX_COORDINATE: f32 = 1.844e18;
 
+/// Elements that one thread looks at before it asks for more.
+const PIECE: usize = 1 << 14;
+
 /// Names listed in a counted warning.
 const NAMES_SHOWN: usize = 3;
 
-/// Checks ids and drops unusable triangles, with a counted warning for each kind.
+/// What was wrong with one mesh.
+#[derive(Default)]
+struct Found {
+    /// Triangles with a vertex that cannot be used.
+    unusable: usize,
+    /// Triangles without area.
+    flat: usize,
+    uvs: usize,
+    colors: usize,
+}
+
+/// Checks ids, drops unusable triangles and instances, cleans attributes, with a counted warning for each kind.
 ///
 /// # Panics
 /// When an id, a vertex index or the length of an attribute is wrong: a bug of the loader.
 pub(super) fn check(scene: &mut Scene) {
     check_ids(scene);
-    let mut unusable = Tally::default();
-    let mut flat = Tally::default();
-    let mut uvs = Tally::default();
-    for mesh in &mut scene.meshes {
-        let [bad, empty] = drop_triangles(mesh);
-        unusable.add(bad, &mesh.name);
-        flat.add(empty, &mesh.name);
-        uvs.add(clean_uvs(mesh), &mesh.name);
+    let found: Vec<Found> = scene.meshes.par_iter_mut().map(check_mesh).collect();
+    type Count = fn(&Found) -> usize;
+    let kinds: [(Count, &str); 4] = [
+        (|f| f.unusable, "triangles dropped: a vertex is not finite or is beyond 1.844e18"),
+        (|f| f.flat, "triangles dropped: without area"),
+        (|f| f.uvs, "texture coordinates that are not finite: taken as 0"),
+        (|f| f.colors, "vertex colours that are negative or not finite: those channels taken as 0 or 1"),
+    ];
+    for (count, what) in kinds {
+        let mut tally = Tally::default();
+        scene.meshes.iter().zip(&found).for_each(|(mesh, f)| tally.add(count(f), &mesh.name));
+        tally.warn(scene, what);
     }
-    unusable.warn(scene, "triangles dropped: a vertex is not finite or is beyond 1.844e18");
-    flat.warn(scene, "triangles dropped: without area");
-    uvs.warn(scene, "texture coordinates that are not finite: taken as 0");
+    drop_instances(scene);
     clean_environment(scene);
 }
 
@@ -45,6 +62,26 @@ fn clean_environment(scene: &mut Scene) {
     }
 }
 
+fn check_mesh(mesh: &mut Mesh) -> Found {
+    let [unusable, flat] = drop_triangles(mesh);
+    Found { unusable, flat, uvs: clean_uvs(mesh), colors: clean_colors(mesh) }
+}
+
+/// Drops instances whose transform squashes everything to a line or a point, so that no triangle has an area: a scale
+/// of 0 is how some files hide things, and their place must not count in the scene's bounds. What is squashed to a
+/// plane stays: triangles in that plane can be seen, and `render::prepare` drops the others one by one.
+fn drop_instances(scene: &mut Scene) {
+    let mut squashed = Tally::default();
+    scene.instances.retain(|instance| {
+        let m = DMat3::from_mat4(instance.world_from_object);
+        let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+        let has_area = [x.cross(y), y.cross(z), z.cross(x)].iter().any(|c| *c != DVec3::ZERO);
+        squashed.add(usize::from(!has_area), &instance.name);
+        has_area
+    });
+    squashed.warn(scene, "instances dropped: their scale squashes them to a line or a point");
+}
+
 fn check_ids(scene: &Scene) {
     for instance in &scene.instances {
         scene.meshes.get(instance.mesh.index()).expect("an instance's mesh was added to the builder");
@@ -58,7 +95,8 @@ fn check_ids(scene: &Scene) {
         assert!(mesh.uv_sets.len() <= MAX_UV_SETS, "few sets of texture coordinates");
         assert!(mesh.colors.as_ref().is_none_or(|a| a.len() == n), "one colour per vertex");
         assert!(mesh.tangents.as_ref().is_none_or(|a| a.len() == n), "one tangent per vertex");
-        assert!(mesh.indices.as_flattened().iter().all(|&i| (i as usize) < n), "vertex indices are in range");
+        let in_range = |piece: &[[u32; 3]]| piece.as_flattened().iter().all(|&i| (i as usize) < n);
+        assert!(mesh.indices.par_chunks(PIECE).all(in_range), "vertex indices are in range");
     }
     for m in &scene.materials {
         for read in m.textures() {
@@ -75,25 +113,31 @@ fn check_ids(scene: &Scene) {
 
 /// How many triangles of `mesh` were dropped: for an unusable vertex, for want of area.
 fn drop_triangles(mesh: &mut Mesh) -> [usize; 2] {
-    let usable = |p: &[f32; 3]| p.iter().all(|c| c.abs() <= MAX_COORDINATE);
     let positions = &mesh.positions;
-    let (mut unusable, mut flat) = (0, 0);
-    mesh.indices.retain(|triangle| {
+    let judge = |triangle: &[u32; 3]| {
         let corners = triangle.map(|i| positions[i as usize]);
-        if !corners.iter().all(usable) {
-            unusable += 1;
-            return false;
-        }
-        let has_area = !is_flat(corners);
-        flat += usize::from(!has_area);
-        has_area
-    });
+        if !corners.iter().all(usable) { [1, 0] } else { [0, usize::from(is_flat(corners))] }
+    };
+    // First counted, in parallel: nearly always there is nothing to drop.
+    let count = |piece: &[[u32; 3]]| piece.iter().map(judge).fold([0, 0], sum);
+    let dropped = mesh.indices.par_chunks(PIECE).map(count).reduce(|| [0, 0], sum);
+    if dropped != [0, 0] {
+        mesh.indices.retain(|triangle| judge(triangle) == [0, 0]);
+    }
     // Vertices that nothing uses any more must not spoil bounds: `positions` are finite from here on.
-    if unusable > 0 || !mesh.positions.iter().all(usable) {
+    if !mesh.positions.par_chunks(PIECE).all(|piece| piece.iter().all(usable)) {
         let stand_in = mesh.positions.iter().find(|p| usable(p)).copied().unwrap_or([0.0; 3]);
         mesh.positions.iter_mut().filter(|p| !usable(p)).for_each(|p| *p = stand_in);
     }
-    [unusable, flat]
+    dropped
+}
+
+fn usable(p: &[f32; 3]) -> bool {
+    p.iter().all(|c| c.abs() <= MAX_COORDINATE)
+}
+
+fn sum(a: [usize; 2], b: [usize; 2]) -> [usize; 2] {
+    [a[0] + b[0], a[1] + b[1]]
 }
 
 /// Whether the area is exactly 0. In f64, where the cross product of f32 edges neither underflows nor, for corners
@@ -107,6 +151,13 @@ fn is_flat(corners: [[f32; 3]; 3]) -> bool {
 fn clean_uvs(mesh: &mut Mesh) -> usize {
     let bad = |uv: &&mut [f32; 2]| !uv.iter().all(|c| c.is_finite());
     mesh.uv_sets.iter_mut().flatten().filter(bad).map(|uv| *uv = [0.0; 2]).count()
+}
+
+/// How many vertex colours had channels that cannot be used; those above 1 can.
+fn clean_colors(mesh: &mut Mesh) -> usize {
+    let clean = |c: f32| if c.is_finite() { c.max(0.0) } else { 1.0 };
+    let bad = |color: &&mut [f32; 4]| !color.iter().all(|c| c.is_finite() && *c >= 0.0);
+    mesh.colors.iter_mut().flatten().filter(bad).map(|color| *color = color.map(clean)).count()
 }
 
 /// A count over meshes, with the names of the first few.
@@ -141,7 +192,8 @@ impl Tally {
 mod tests {
     use super::*;
     use crate::material::Material;
-    use crate::scene::MaterialId;
+    use crate::scene::{Instance, MaterialId, MeshId};
+    use glam::DMat4;
 
     fn scene(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Scene {
         let mesh = Mesh {
@@ -198,6 +250,29 @@ mod tests {
         check(&mut scene);
         assert_eq!(scene.environment.unwrap().radiance, [[1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
         assert!(scene.warnings[0].starts_with("3 texels of the environment"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn vertex_colors_above_one_stay_and_unusable_ones_are_cleaned() {
+        let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+        scene.meshes[0].colors = Some(vec![[2.0, 0.5, 0.0, 1.0], [-1.0, f32::NAN, 0.5, 1.0], [f32::INFINITY; 4]]);
+        check(&mut scene);
+        let cleaned = vec![[2.0, 0.5, 0.0, 1.0], [0.0, 1.0, 0.5, 1.0], [1.0; 4]];
+        assert_eq!(scene.meshes[0].colors, Some(cleaned));
+        assert!(scene.warnings[0].starts_with("2 vertex colours"), "{:?}", scene.warnings);
+    }
+
+    #[test]
+    fn instances_squashed_to_a_line_go_and_those_squashed_to_a_plane_stay() {
+        let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+        for scale in [[1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [-1.0, 1.0, 1e-6]] {
+            let world_from_object = DMat4::from_scale(DVec3::from_array(scale));
+            scene.instances.push(Instance { mesh: MeshId(0), world_from_object, name: format!("{scale:?}") });
+        }
+        check(&mut scene);
+        let kept: Vec<_> = scene.instances.iter().map(|i| i.name.as_str()).collect();
+        assert_eq!(kept, ["[1.0, 1.0, 0.0]", "[-1.0, 1.0, 1e-6]"]);
+        assert!(scene.warnings[0].starts_with("2 instances dropped"), "{:?}", scene.warnings);
     }
 
     #[test]

@@ -104,6 +104,30 @@ impl Sample {
         self
     }
 
+    /// Appends a view with `bytes`; its index.
+    pub fn add_view(&mut self, bytes: &[u8]) -> usize {
+        self.bin.resize(self.bin.len().next_multiple_of(4), 0);
+        let view = json!({"buffer": 0, "byteOffset": self.bin.len(), "byteLength": bytes.len()});
+        self.bin.extend(bytes);
+        self.json["buffers"][0]["byteLength"] = json!(self.bin.len());
+        let views = self.json["bufferViews"].as_array_mut().unwrap();
+        views.push(view);
+        views.len() - 1
+    }
+
+    /// Appends an accessor to a view of its own; its index.
+    pub fn add_accessor(&mut self, bytes: &[u8], component: u32, kind: &str, count: usize) -> usize {
+        let view = self.add_view(bytes);
+        self.add(json!({"bufferView": view, "componentType": component, "type": kind, "count": count}))
+    }
+
+    /// Appends an accessor; its index.
+    pub fn add(&mut self, accessor: Value) -> usize {
+        let accessors = self.json["accessors"].as_array_mut().unwrap();
+        accessors.push(accessor);
+        accessors.len() - 1
+    }
+
     /// Overwrites bytes of buffer 0.
     pub fn poke(mut self, at: usize, bytes: &[u8]) -> Self {
         self.bin[at..at + bytes.len()].copy_from_slice(bytes);
@@ -152,6 +176,11 @@ impl Sample {
     pub fn error(&self) -> LoadError {
         self.load().expect_err("must not load")
     }
+}
+
+/// Little-endian bytes of floats.
+pub fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|v| v.to_le_bytes()).collect()
 }
 
 /// A PNG of 8-bit RGBA pixels.

@@ -2,15 +2,19 @@
 
 use super::locate::shorten;
 use super::{Document, Loader, Result};
+use std::sync::PoisonError;
 
 /// Read.
 const READ: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_unlit",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
 ];
 
@@ -77,7 +81,7 @@ pub(super) fn note_carried<'a>(
     except: &[&str],
 ) {
     for name in names.filter(|n| is_ignored(n) && !except.contains(&n.as_str())) {
-        let mut ignored = doc.ignored.borrow_mut();
+        let mut ignored = doc.ignored.lock().unwrap_or_else(PoisonError::into_inner);
         ignored.entry(name.clone()).and_modify(|(_, n)| *n += 1).or_insert_with(|| (pointer.to_owned(), 1));
     }
 }
@@ -86,7 +90,7 @@ pub(super) fn note_carried<'a>(
 /// place, and of those that only the file's list names.
 pub(super) fn warn_ignored(loader: &mut Loader) {
     let doc = loader.doc;
-    let ignored = doc.ignored.borrow();
+    let ignored = doc.ignored.lock().unwrap_or_else(PoisonError::into_inner);
     for (name, (first, count)) in ignored.iter() {
         let more = if *count > 1 { format!(", first of {count} places") } else { String::new() };
         let loss = LOSSES.iter().find(|(n, _)| n == name).map(|(_, loss)| format!(": {loss}")).unwrap_or_default();

@@ -1,6 +1,7 @@
 //! Images: bytes from a buffer view, a data URI or a file; decoded in parallel, each once.
 
-use super::document::{Document, read_file};
+use super::container::read_file;
+use super::document::Document;
 use super::uri::Source;
 use super::{Loader, Result, name_or};
 use crate::image::decode::{self, Format, Pixels};
@@ -59,7 +60,7 @@ fn find(doc: &Document, index: usize) -> Result<Encoded<'_>> {
         (Some(view), None) => {
             let pointer = format!("{at}/bufferView");
             let (bytes, _) = doc.view(view, &pointer)?;
-            (Bytes::Here(Cow::Borrowed(bytes)), pointer)
+            (Bytes::Here(bytes), pointer)
         }
         (None, Some(uri)) => {
             let pointer = format!("{at}/uri");

@@ -9,25 +9,34 @@ mod base64;
 mod buffer;
 mod camera;
 mod check;
+mod container;
 mod document;
 mod extensions;
 mod image;
+mod instancing;
 mod light;
 mod locate;
 mod material;
 mod mesh;
+mod morph;
 mod node;
+mod primitive;
+mod semantic;
+mod skin;
 mod texture;
 mod texture_info;
+mod topology;
 mod uri;
 
 use super::{LoadOptions, LoadTimes};
 use crate::camera::Camera;
 use crate::error::LoadError;
-use crate::scene::{MeshId, Scene, SceneBuilder};
+use crate::scene::{Scene, SceneBuilder};
 use document::Document;
+use glam::DMat4;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::rc::Rc;
 use std::time::Instant;
 
 type Result<T> = std::result::Result<T, LoadError>;
@@ -45,7 +54,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
     let parents = check::tree(&doc)?;
     let chosen = node::choose_scene(&doc, options.scene.as_deref(), &parents)?;
 
-    let mut loader = Loader::new(&doc, chosen.index);
+    let mut loader = Loader::new(&doc, &parents, chosen.index);
     doc.warnings.iter().for_each(|w| loader.builder.warn(w));
     if let Some(warning) = &chosen.warning {
         loader.builder.warn(warning);
@@ -74,7 +83,7 @@ pub fn load_cameras(path: &Path) -> Result<Vec<Camera>> {
     extensions::check_required(&doc)?;
     let parents = check::tree(&doc)?;
     let chosen = node::choose_scene(&doc, None, &parents)?;
-    let mut loader = Loader::new(&doc, chosen.index);
+    let mut loader = Loader::new(&doc, &parents, chosen.index);
     node::walk_cameras(&mut loader, &chosen.roots)?;
     Ok(loader.builder.finish().cameras)
 }
@@ -83,8 +92,13 @@ pub fn load_cameras(path: &Path) -> Result<Vec<Camera>> {
 struct Loader<'d> {
     doc: &'d Document,
     builder: SceneBuilder,
-    /// glTF mesh -> one [`MeshId`] per primitive that can be drawn.
-    meshes: BTreeMap<usize, Vec<MeshId>>,
+    /// The parent of each node.
+    parents: &'d [Option<usize>],
+    /// glTF mesh in a pose -> ours.
+    meshes: BTreeMap<mesh::Key, mesh::Posed>,
+    skins: BTreeMap<usize, Rc<skin::Palette>>,
+    /// World transforms of the joints of skins and of the nodes above them.
+    worlds: BTreeMap<usize, DMat4>,
     /// glTF material (`None` = the default one) -> ours.
     materials: BTreeMap<Option<usize>, material::Read>,
     textures: texture::Textures,
@@ -95,11 +109,14 @@ struct Loader<'d> {
 }
 
 impl<'d> Loader<'d> {
-    fn new(doc: &'d Document, scene: usize) -> Self {
+    fn new(doc: &'d Document, parents: &'d [Option<usize>], scene: usize) -> Self {
         Self {
             doc,
             builder: SceneBuilder::new(scene),
+            parents,
             meshes: BTreeMap::new(),
+            skins: BTreeMap::new(),
+            worlds: BTreeMap::new(),
             materials: BTreeMap::new(),
             textures: texture::Textures::default(),
             cameras: BTreeSet::new(),
@@ -122,7 +139,8 @@ impl<'d> Loader<'d> {
         let skip = |builder: &mut SceneBuilder, list: &str, len: usize, used: &dyn Fn(usize) -> bool| {
             (0..len).filter(|&i| !used(i)).for_each(|i| builder.skip(format!("{list}/{i}"), unused.as_str()));
         };
-        skip(&mut self.builder, "meshes", root.meshes.len(), &|i| self.meshes.contains_key(&i));
+        let meshes: BTreeSet<usize> = self.meshes.keys().map(|k| k.mesh).collect();
+        skip(&mut self.builder, "meshes", root.meshes.len(), &|i| meshes.contains(&i));
         skip(&mut self.builder, "materials", root.materials.len(), &|i| self.materials.contains_key(&Some(i)));
         skip(&mut self.builder, "images", root.images.len(), &|i| self.textures.uses_image(i));
         skip(&mut self.builder, "cameras", root.cameras.len(), &|i| self.cameras.contains(&i));

@@ -2,10 +2,12 @@
 
 use super::check::children;
 use super::locate::shorten;
-use super::{Document, Loader, Result, camera, extensions, light, mesh, name_or};
+use super::{Document, Loader, Result, camera, extensions, instancing, light, mesh, name_or};
 use crate::scene::Instance;
 use glam::{DMat4, DQuat, DVec3};
+use gltf::json::Index;
 use gltf::json::scene::Node;
+use serde_json::Value;
 
 /// A quaternion whose length is further than this from 1 is told to the user; f32 exporters stay far below.
 const QUATERNION_SLACK: f64 = 1e-3;
@@ -95,51 +97,139 @@ pub(super) fn walk(loader: &mut Loader, roots: &[usize]) -> Result<()> {
 
 /// Places the cameras below `roots` and nothing else.
 pub(super) fn walk_cameras(loader: &mut Loader, roots: &[usize]) -> Result<()> {
-    visit(loader, roots, place_camera)
+    visit(loader, roots, |loader, node, i, here| place_camera(loader, node, i, here.world))
 }
 
-/// Calls `place` with every node below `roots`, its index and its world transform.
+/// Calls `place` with every node below `roots`, its index and what it inherits with its own part.
 fn visit(
     loader: &mut Loader,
     roots: &[usize],
-    place: fn(&mut Loader, &Node, usize, DMat4) -> Result<()>,
+    place: fn(&mut Loader, &Node, usize, Above) -> Result<()>,
 ) -> Result<()> {
     // A stack of our own: files with very deep trees exist.
-    let mut stack: Vec<(usize, DMat4)> = roots.iter().rev().map(|&i| (i, DMat4::IDENTITY)).collect();
+    let root = Above { world: DMat4::IDENTITY, visible: true };
+    let mut stack: Vec<(usize, Above)> = roots.iter().rev().map(|&i| (i, root)).collect();
     while let Some((i, above)) = stack.pop() {
         let Some(node) = loader.doc.root.nodes.get(i) else { continue };
-        let world = above * local(loader, node, i)?;
-        if !world.is_finite() {
-            let fix = "The product of the transforms above this node is too large.";
-            return Err(loader.doc.error(format!("/nodes/{i}"), "the world transform is not finite", fix));
-        }
-        place(loader, node, i, world)?;
-        stack.extend(children(node).iter().rev().map(|c| (c.value(), world)));
+        let world = below(loader, above.world, node, i)?;
+        let here = Above { world, visible: above.visible && visible(loader.doc, node, i)? };
+        place(loader, node, i, here)?;
+        stack.extend(children(node).iter().rev().map(|c| (c.value(), here)));
     }
     Ok(())
 }
 
-fn place(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Result<()> {
+/// What a node inherits.
+#[derive(Clone, Copy)]
+struct Above {
+    world: DMat4,
+    /// `false` below a node that KHR_node_visibility hides.
+    visible: bool,
+}
+
+/// The world transform of node `i`, from the root of its tree down; remembered.
+pub(super) fn world(loader: &mut Loader, i: usize) -> Result<DMat4> {
+    let mut path = Vec::new();
+    let mut at = Some(i);
+    let mut world = DMat4::IDENTITY;
+    while let Some(node) = at {
+        if let Some(&known) = loader.worlds.get(&node) {
+            world = known;
+            break;
+        }
+        path.push(node);
+        at = loader.parents.get(node).copied().flatten();
+    }
+    for i in path.into_iter().rev() {
+        let Some(node) = loader.doc.root.nodes.get(i) else { continue };
+        world = below(loader, world, node, i)?;
+        loader.worlds.insert(i, world);
+    }
+    Ok(world)
+}
+
+/// The world transform of a node below something placed at `above`.
+fn below(loader: &mut Loader, above: DMat4, node: &Node, i: usize) -> Result<DMat4> {
+    let world = above * local(loader, node, i)?;
+    if !world.is_finite() {
+        let fix = "The product of the transforms above this node is too large.";
+        return Err(loader.doc.error(format!("/nodes/{i}"), "the world transform is not finite", fix));
+    }
+    Ok(world)
+}
+
+/// What KHR_node_visibility says of the node alone.
+fn visible(doc: &Document, node: &Node, i: usize) -> Result<bool> {
+    const NAME: &str = "KHR_node_visibility";
+    let Some(found) = node.extensions.as_ref().and_then(|e| e.others.get(NAME)) else { return Ok(true) };
+    match found.get("visible") {
+        None => Ok(true),
+        Some(Value::Bool(visible)) => Ok(*visible),
+        Some(_) => {
+            let at = format!("/nodes/{i}/extensions/{NAME}/visible");
+            Err(doc.bad(&at, "is neither true nor false", "Allowed: true, false; true without it."))
+        }
+    }
+}
+
+fn place(loader: &mut Loader, node: &Node, i: usize, Above { world, visible }: Above) -> Result<()> {
+    if node.mesh.is_none() && node.camera.is_none() && node.extensions.is_none() {
+        return Ok(());
+    }
     let doc = loader.doc;
     let at = format!("/nodes/{i}");
-    let name = name_or(node.name.as_ref(), "nodes", i);
+    let name = || name_or(node.name.as_ref(), "nodes", i);
     if let Some(carried) = &node.extensions {
         extensions::note_carried(doc, carried.others.keys(), &at, &[]);
     }
-    if let Some(index) = node.mesh {
-        if let Some(skin) = node.skin {
-            doc.item(&doc.root.skins, skin, &format!("{at}/skin"), "skins")?;
-            let fix = "Apply the armature before exporting.";
-            return Err(doc.not_built(format!("{at}/skin"), "skins are", fix));
-        }
-        for mesh in mesh::read(loader, index, &format!("{at}/mesh"))? {
-            loader.builder.add_instance(Instance { mesh, world_from_object: world, name: name.clone() });
-        }
+    if let Some(index) = node.mesh
+        && visible
+    {
+        place_mesh(loader, node, index, &at, world, name())?;
     }
+    // Hidden nodes keep their cameras: the extension says that it does not affect them.
     place_camera(loader, node, i, world)?;
-    if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
+    if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref())
+        && visible
+    {
         let pointer = format!("{at}/extensions/KHR_lights_punctual/light");
-        light::place(loader, light.light, &pointer, world, &at, &name)?;
+        light::place(loader, light.light, &pointer, world, &at, &name())?;
+    }
+    Ok(())
+}
+
+/// Places a node's mesh: by the node, by the joints of its skin, or once per instance.
+fn place_mesh(
+    loader: &mut Loader,
+    node: &Node,
+    index: Index<gltf::json::Mesh>,
+    at: &str,
+    world: DMat4,
+    name: String,
+) -> Result<()> {
+    let posed = mesh::read(loader, index, &format!("{at}/mesh"), node, at)?;
+    let instancing = node.extensions.as_ref().and_then(|e| e.others.get(instancing::NAME));
+    let worlds = match (instancing, posed.world) {
+        (None, Some(world)) => vec![world],
+        (Some(_), Some(world)) => {
+            loader.warn_once("instances of a skinned mesh are not placed: its joints place it, once");
+            vec![world]
+        }
+        (None, None) => vec![world],
+        (Some(found), None) => {
+            let at = format!("{at}/extensions/{}", instancing::NAME);
+            let each = instancing::read(loader, found, &at)?;
+            each.into_iter().map(|instance| world * instance).collect()
+        }
+    };
+    for world_from_object in worlds {
+        if !world_from_object.is_finite() {
+            let fix = "The product of the transforms above it is too large.";
+            return Err(loader.doc.error(at, "the world transform of an instance is not finite", fix));
+        }
+        for &mesh in posed.ids.iter() {
+            loader.builder.add_instance(Instance { mesh, world_from_object, name: name.clone() });
+        }
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use super::document::Document;
 use super::locate::shorten;
 use super::{Result, base64};
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 /// Where URIs may lead.
@@ -47,20 +48,27 @@ impl Document {
         found.map(Source::File).map_err(|r| self.error(pointer, format!("\"{}\" {}", shorten(uri), r.problem), r.fix))
     }
 
-    /// `[type][;parameters];base64,payload`.
+    /// `[type][;parameters][;base64],payload` (RFC 2397).
     fn data_uri(&self, pointer: &str, rest: &str) -> Result<Source> {
         let fail = |why: String| {
-            self.error(pointer, format!("data URI: {why}"), "Allowed is data:[type];base64,DATA with padded base64.")
+            let fix = "Allowed is data:[type];base64,DATA with padded base64, or data:[type],TEXT with %xx for bytes.";
+            self.error(pointer, format!("data URI: {why}"), fix)
         };
         let Some((head, payload)) = rest.split_once(',') else {
             return Err(fail(format!("no comma in \"{}\"", shorten(rest))));
         };
         let mut parts = head.split(';');
         let media = parts.next().unwrap_or_default().to_owned();
-        if !parts.any(|p| p.eq_ignore_ascii_case("base64")) {
-            return Err(fail(format!("\"{}\" is not base64", shorten(head))));
-        }
-        base64::decode(payload.as_bytes()).map(|bytes| Source::Data(bytes, media)).map_err(fail)
+        // Large payloads are base64 without escapes: those are not copied first.
+        let bytes = match payload.contains('%') {
+            true => Cow::Owned(percent_bytes(payload).map_err(fail)?),
+            false => Cow::Borrowed(payload.as_bytes()),
+        };
+        let bytes = match parts.any(|p| p.eq_ignore_ascii_case("base64")) {
+            true => base64::decode(&bytes).map_err(fail)?,
+            false => bytes.into_owned(),
+        };
+        Ok(Source::Data(bytes, media))
     }
 }
 
@@ -73,6 +81,11 @@ fn scheme(uri: &str) -> Option<&str> {
 
 /// The text with `%xx` replaced by bytes, which must be UTF-8.
 fn percent_decode(uri: &str) -> std::result::Result<String, String> {
+    String::from_utf8(percent_bytes(uri)?).map_err(|_| "is not UTF-8 when its %xx are replaced".into())
+}
+
+/// The bytes of the text, with `%xx` replaced.
+fn percent_bytes(uri: &str) -> std::result::Result<Vec<u8>, String> {
     let mut out = Vec::with_capacity(uri.len());
     let mut bytes = uri.bytes();
     while let Some(byte) = bytes.next() {
@@ -86,7 +99,7 @@ fn percent_decode(uri: &str) -> std::result::Result<String, String> {
             _ => return Err("has a % that no two hexadecimal digits follow".into()),
         }
     }
-    String::from_utf8(out).map_err(|_| "is not UTF-8 when its %xx are replaced".into())
+    Ok(out)
 }
 
 #[cfg(test)]

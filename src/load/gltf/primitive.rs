@@ -1,0 +1,214 @@
+//! One primitive: its attributes, deformed by morph targets and skin, as a [`Mesh`].
+
+use super::accessor::{self, Elements};
+use super::semantic::{INDICES, NORMAL, POSITION, TANGENT, Wanted};
+use super::skin::Palette;
+use super::topology::{Topology, topology};
+use super::{Loader, Result, extensions, material, morph};
+use crate::load::tangents;
+use crate::shape::Mesh;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use rayon::prelude::*;
+
+/// Reads a primitive, found at `at` in the mesh `name`, in a pose; `weights` are those of its morph targets (empty =
+/// all 0). `None` if it has no triangles.
+pub(super) fn read(
+    loader: &mut Loader,
+    primitive: &Primitive,
+    at: &str,
+    name: &str,
+    weights: &[f32],
+    palette: Option<&Palette>,
+) -> Result<Option<Mesh>> {
+    let doc = loader.doc;
+    if let Some(carried) = &primitive.extensions {
+        extensions::note_carried(doc, carried.others.keys(), at, &["KHR_draco_mesh_compression"]);
+    }
+    let Some(positions) = Attributes { loader, primitive, at }.open(&Semantic::Positions, &POSITION, None)? else {
+        loader.builder.warn(format!("{name}: {at} has no POSITION: nothing to draw"));
+        return Ok(None);
+    };
+    if positions.is_zero() && weights.is_empty() {
+        loader.builder.warn(format!("{name}: the POSITION of {at} are all zero: nothing to draw"));
+        return Ok(None);
+    }
+    let n = positions.count;
+    let Some(indices) = triangles(loader, primitive, at, name, n)? else { return Ok(None) };
+
+    let surface = material::read(loader, primitive.material, &format!("{at}/material"))?;
+    let normal_map = loader.builder.material(surface.id).normal.texture.filter(|_| surface.normal_mapped);
+    let attributes = Attributes { loader, primitive, at };
+    let normals = attributes.open(&Semantic::Normals, &NORMAL, Some(n))?;
+    // Without normals, tangents are to be ignored (section 3.7.2.1).
+    let tangents = match normal_map.is_some() && normals.is_some() {
+        false => None,
+        true => attributes.open(&Semantic::Tangents, &TANGENT, Some(n))?,
+    };
+    let colors = attributes.open(&Semantic::Colors(0), &Wanted::color(), Some(n))?;
+    let mut missing = Vec::new();
+    let mut uv_sets = Vec::new();
+    for &set in &surface.tex_coords {
+        let found = attributes.open(&Semantic::TexCoords(set), &Wanted::tex_coord(set), Some(n))?;
+        if found.is_none() {
+            missing.push(set);
+        }
+        uv_sets.push(found);
+    }
+    // Independent of each other, and most of the time that a large file takes.
+    let ((positions, normals), (uv_sets, (tangents, colors))) = rayon::join(
+        || (positions.floats(), normals.map(|e| e.floats()).transpose()),
+        || {
+            let read = |e: Option<Elements>| e.map_or_else(|| Ok(vec![[0.0; 2]; n]), |e| e.floats());
+            let uv_sets = uv_sets.into_iter().map(read).collect::<Result<Vec<_>>>();
+            let tangents = tangents.map(|e| e.floats()).transpose();
+            (uv_sets, (tangents, colors.map(|e| e.colors()).transpose()))
+        },
+    );
+    let mut mesh = Mesh {
+        positions: positions?,
+        normals: normals?,
+        uv_sets: uv_sets?,
+        colors: colors?,
+        tangents: tangents?,
+        indices,
+        material: surface.id,
+        name: name.to_owned(),
+    };
+    morph::apply(&attributes, weights, &mut mesh)?;
+    if let Some(palette) = palette {
+        palette.apply(&attributes, &mut mesh)?;
+    }
+    for set in missing {
+        let text = format!("{name}: {at} has no TEXCOORD_{set}, which {} reads: taken as 0", surface.pointer);
+        loader.builder.warn(text);
+    }
+    if primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(1))) {
+        loader.warn_once("vertex colours other than COLOR_0 are ignored");
+    }
+    if let Some(map) = normal_map {
+        add_tangents(loader, &mut mesh, at, &map);
+    }
+    Ok(Some(mesh))
+}
+
+/// Gives a normal-mapped mesh tangents, or repairs those it has.
+fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, map: &crate::texture::TextureRef) {
+    let name = mesh.name.clone();
+    if mesh.tangents.is_some() {
+        let repaired = tangents::repair(mesh);
+        if repaired > 0 {
+            let text = format!("{name}: {at}: {repaired} tangents have no direction across the normal: replaced");
+            loader.builder.warn(text);
+        }
+    } else if let Err(tangents::TooManyTriangles(n)) = tangents::generate(mesh, map.uv_set as usize, map.transform) {
+        let text =
+            format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
+        loader.builder.warn(text);
+    }
+}
+
+/// The triangles of a primitive of `n` vertices; `None`, noted, if it has none.
+fn triangles(
+    loader: &mut Loader,
+    primitive: &Primitive,
+    at: &str,
+    name: &str,
+    n: usize,
+) -> Result<Option<Vec<[u32; 3]>>> {
+    let doc = loader.doc;
+    let Checked::Valid(mode) = primitive.mode else {
+        let fix = "Allowed: 0 to 6 (points, lines, line loop, line strip, triangles, triangle strip, triangle fan).";
+        return Err(doc.bad(&format!("{at}/mode"), "is not a mode", fix));
+    };
+    let Ok(count) = u32::try_from(n) else {
+        return Err(doc.error(at, format!("{n} vertices"), "At most 2^32 - 1 are read in one primitive."));
+    };
+    let made = match primitive.indices {
+        None if mode == Mode::Triangles => {
+            Topology::Triangles((0..count / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(), n % 3)
+        }
+        None => topology(mode, (0..count).collect()),
+        Some(index) => {
+            let elements = accessor::open(doc, index, &format!("{at}/indices"), &INDICES)?;
+            let flat = elements.indices()?;
+            check_indices(loader, &flat, n, elements.restart(), index.value(), at)?;
+            topology(mode, flat)
+        }
+    };
+    match made {
+        Topology::Triangles(triangles, rest) => {
+            if triangles.is_empty() {
+                loader.builder.warn(format!("{name}: {at} has {n} vertices and no triangle: left out"));
+                return Ok(None);
+            }
+            if rest > 0 {
+                let text = format!("{name}: the corners of {at} are not a multiple of 3: the last {rest} ignored");
+                loader.builder.warn(text);
+            }
+            Ok(Some(triangles))
+        }
+        Topology::Without(count, what) => {
+            let why = format!("{count} {what}: they have no surface to draw");
+            loader.builder.skip(at.trim_start_matches('/'), why);
+            loader.warn_once("the scene has points or lines, which are not drawn (listed under skipped)");
+            Ok(None)
+        }
+    }
+}
+
+/// Every index must be one of the `n` vertices, and none the value `restart`.
+fn check_indices(loader: &Loader, indices: &[u32], n: usize, restart: u32, accessor: usize, at: &str) -> Result<()> {
+    let greatest = indices.par_chunks(1 << 16).map(|c| c.iter().copied().max().unwrap_or(0)).max().unwrap_or(0);
+    if (greatest as usize) < n && greatest < restart || indices.is_empty() {
+        return Ok(());
+    }
+    let wrong = |i: &u32| *i as usize >= n || *i == restart;
+    let k = indices.iter().position(wrong).unwrap_or(0);
+    let value = indices.get(k).copied().unwrap_or(0);
+    let found = format!("element {k} of accessor {accessor} is {value}");
+    let (why, fix) = if value == restart {
+        let why = "the primitive restart value of its type";
+        (why, "The specification forbids it: make separate primitives, or use a wider type of indices.".to_owned())
+    } else {
+        let fix = format!("POSITION has {n} elements: 0 to {} are allowed.", n.saturating_sub(1));
+        ("there is no such vertex", fix)
+    };
+    Err(loader.doc.error(format!("{at}/indices"), format!("{found}: {why}"), fix))
+}
+
+/// The attributes of one primitive.
+pub(super) struct Attributes<'l, 'd> {
+    pub loader: &'l Loader<'d>,
+    pub primitive: &'l Primitive,
+    pub at: &'l str,
+}
+
+impl<'d> Attributes<'_, 'd> {
+    /// The elements of an attribute, `count` of them where that is given; `None` if the primitive does not have it.
+    pub fn open(&self, semantic: &Semantic, wanted: &Wanted, count: Option<usize>) -> Result<Option<Elements<'d>>> {
+        let Some(&index) = self.primitive.attributes.get(&Checked::Valid(semantic.clone())) else {
+            return Ok(None);
+        };
+        let pointer = format!("{}/attributes/{}", self.at, wanted.name);
+        self.elements(index, &pointer, wanted, count).map(Some)
+    }
+
+    /// The elements of the accessor at `index`, found at `pointer`; as many as there are vertices.
+    pub fn elements(
+        &self,
+        index: gltf::json::Index<gltf::json::Accessor>,
+        pointer: &str,
+        wanted: &Wanted,
+        count: Option<usize>,
+    ) -> Result<Elements<'d>> {
+        let elements = accessor::open(self.loader.doc, index, pointer, wanted)?;
+        match count {
+            Some(n) if n != elements.count => {
+                let fix = "All attributes of a primitive have one element per vertex.";
+                Err(self.loader.doc.error(pointer, format!("{} elements but POSITION has {n}", elements.count), fix))
+            }
+            _ => Ok(elements),
+        }
+    }
+}
