@@ -20,11 +20,6 @@ impl Document {
         self.error(pointer, format!("{} {why}", self.shown(pointer)), fix)
     }
 
-    /// An error about something that glTF has and that this program does not build yet.
-    pub fn not_built(&self, pointer: impl Into<String>, feature: impl Into<String>, fix: &str) -> LoadError {
-        self.error(pointer, format!("{} not built yet", feature.into()), fix)
-    }
-
     /// What `index` (found at `pointer`) points to in `list`; `kind` names the list in the message.
     pub fn item<'a, T, U>(&self, list: &'a [T], index: Index<U>, pointer: &str, kind: &str) -> Result<&'a T> {
         list.get(index.value()).ok_or_else(|| {
