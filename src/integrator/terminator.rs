@@ -58,8 +58,7 @@ mod tests {
         #[inline(always)]
         fn run<L: Lanes>(self) -> f32 {
             let mut table = TriangleTable::with_capacity(1);
-            let [a, b, c] = self.corners;
-            table.push(self.corners, (b - a).cross(c - a).normalize(), 0, NONE, NONE);
+            table.push(self.corners, normal(self.corners), 0, NONE, NONE);
             let triangle = table.get::<L>(L::U::splat(0));
             let normals = [0, 1, 2].map(|k| V3::splat(self.normals[k].to_array()));
             let front = L::F::splat(if self.front { 1.0 } else { -1.0 }).gt(L::F::zero());

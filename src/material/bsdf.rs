@@ -142,10 +142,12 @@ impl<L: Lanes> Bsdf<L> {
         }
     }
 
-    /// The same with the diffuse lobe about the world normal `normal` (unit) in `lanes`: the specular lobe's normal may
+    /// The same with the diffuse lobe about the world normal `normal` (unit) in `lanes` that have two lobes: the specular
+    /// lobe's normal may
     /// have been bent for its mirror's sake, which is no matter of the diffuse one.
     #[inline(always)]
     pub fn with_diffuse_normal(self, normal: V3<L>, lanes: L::M) -> Self {
+        let lanes = lanes & !self.is_diffuse;
         let normal = self.frame.to_local(normal).normalized().or_else(lanes, self.diffuse_normal);
         Self { diffuse_normal: normal, is_split: lanes, has_split: lanes.any(), ..self }
     }

@@ -197,7 +197,8 @@ fn flatten(
             continue;
         }
         mesh_area += area;
-        let ng = (cross / (2.0 * area)).as_vec3();
+        // + 0 turns -0 into 0, here and below: the frame about a normal depends on the sign.
+        let ng = (cross / (2.0 * area)).as_vec3() + glam::Vec3::ZERO;
         let mut normals = mesh.normals.as_ref().map(|n| {
             [i, j, k].map(|v| {
                 let n = glam::Vec3::from(n[v as usize]).as_dvec3();
@@ -210,6 +211,7 @@ fn flatten(
             totals.turned_normals += 1;
             normals = normals.map(|n| n.map(|n| -n));
         }
+        let normals = normals.map(|n| n.map(|n| n + glam::Vec3::ZERO));
         let attributes = if needs_attributes { push_attributes(mesh, [i, j, k], normals, table) } else { NONE };
         let tangents = mesh.tangents.as_ref().map_or(NONE, |t| {
             table.push_tangents([i, j, k].map(|v| {

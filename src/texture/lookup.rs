@@ -211,8 +211,9 @@ impl TextureTable {
             let [d, e, f, _] = (row + L::U::splat(1)).records(&self.transforms);
             (u, v) = (a.mul_add(u, b.mul_add(v, c)), d.mul_add(u, e.mul_add(v, f)));
         }
-        let across = taps::<L>(u, width.to_float(), flags);
-        let down = taps::<L>(v, height.to_float(), flags.shr(WRAP_BITS));
+        let nearest = flags.has(NEAREST);
+        let across = taps::<L>(u, width.to_float(), flags, nearest);
+        let down = taps::<L>(v, height.to_float(), flags.shr(WRAP_BITS), nearest);
         // Both ways give lanes of four bytes the same bits, so a lane does not depend on its neighbours.
         if self.has_packed && flags.has(PACKED).any() {
             let packing = Packing::<L>::new(flags);
@@ -328,11 +329,10 @@ struct Taps<L: Lanes> {
 
 /// Where coordinate `u` falls among `size` texels; texel centres lie at (i + 1/2) / size.
 #[inline(always)]
-fn taps<L: Lanes>(u: L::F, size: L::F, flags: L::U) -> Taps<L> {
+fn taps<L: Lanes>(u: L::F, size: L::F, flags: L::U, nearest: L::M) -> Taps<L> {
     let (zero, one, half) = (L::F::zero(), L::F::one(), L::F::splat(0.5));
     let clamps = flags.has(CLAMP);
     let mirrors = flags.has(MIRROR);
-    let nearest = flags.has(NEAREST) | flags.shl(WRAP_BITS).has(NEAREST);
     // Into one period; NaN (an infinite coordinate) becomes 0.
     let repeated = u - u.floor();
     let folded = one - (u - (u * half).floor() * L::F::splat(2.0) - one).abs();

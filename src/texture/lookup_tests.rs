@@ -61,6 +61,14 @@ fn texel_centres_give_the_texel_and_row_0_is_at_the_top() {
 }
 
 #[test]
+fn bilinear_blends_in_both_directions_under_every_wrap_mode() {
+    for wrap in [Wrap::Repeat, Wrap::ClampToEdge, Wrap::MirroredRepeat] {
+        let got = read(&table(wrap, Filter::Bilinear), 1.0 / 3.0, 0.5);
+        assert!((got[0] - 50.0).abs() < 1e-3 && (got[1] - 100.0).abs() < 1e-3, "{wrap:?}: {got:?}");
+    }
+}
+
+#[test]
 fn bilinear_blends_across_the_border_as_the_wrap_mode_says() {
     let border = |wrap| read(&table(wrap, Filter::Bilinear), 0.0, 0.25)[0];
     assert!((border(Wrap::Repeat) - 100.0).abs() < 1e-3);
