@@ -91,7 +91,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Assets that only glow, and are not lit by it.
-const GLOWING: [&str; 3] = ["TransmissionTest", "Lamborghini", "EmissiveStrengthTest"];
+const GLOWING: [&str; 4] = ["TransmissionTest", "Lamborghini", "ClearCoatTest", "MultiUVTest"];
 
 #[test]
 fn assets_that_only_glow_get_the_studio() {
