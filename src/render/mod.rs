@@ -7,7 +7,7 @@ mod prepare;
 mod schedule;
 mod settings;
 
-pub use default_light::{DefaultLightReport, LEAST_EMITTED};
+pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use frame::render;
 pub use prepare::{Prepared, prepare};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};

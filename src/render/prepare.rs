@@ -147,7 +147,6 @@ fn flatten(
     let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
     // Mean over channels: what its share of the light samples follows.
     let average = emission.iter().sum::<f64>() / 3.0;
-    let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
     let mut mesh_area = 0.0;
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
@@ -177,12 +176,13 @@ fn flatten(
         geometry.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
         if average > 0.0 {
+            let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
             let power = average * area * sides * std::f64::consts::PI;
             let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
             lights.push((light, power));
         }
     }
-    totals.surface.add(mesh_area, emission, sides);
+    totals.surface.add(mesh_area, material, emission);
 }
 
 /// Attributes of a triangle's corners.
