@@ -93,6 +93,7 @@ pub struct DefaultLight {
     pub requested: &'static str,
     pub used: bool,
     pub emitted_lm_per_m2: f64,
+    pub glowing_share: f64,
 }
 
 /// Wall seconds of the image's own work; null where it did not come to that.

@@ -380,7 +380,8 @@ fn describe(frame: &Frame, settings: &RenderSettings, image: &mut ImageReport) {
     image.default_light = Some(report::DefaultLight {
         requested: default_light_name(stats.default_light.requested),
         used: stats.default_light.used,
-        emitted_lm_per_m2: stats.default_light.emitted,
+        emitted_lm_per_m2: stats.default_light.emitted.by_lamps,
+        glowing_share: stats.default_light.emitted.glowing,
     });
     image.notes.extend(stats.default_light.note());
     image.features = stats.features.iter().copied().collect();

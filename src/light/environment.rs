@@ -86,9 +86,9 @@ impl EnvironmentTable {
             rows[row].iter().map(record).collect::<Vec<_>>()
         };
         table.texels.extend(records(0, 0.0));
-        for row in 0..h {
+        for (row, texels) in rows.iter().enumerate() {
             table.texels.extend(records(row, sine(row)));
-            distribution::push_ends(&rows[row].iter().map(mean).collect::<Vec<_>>(), &mut table.columns);
+            distribution::push_ends(&texels.iter().map(mean).collect::<Vec<_>>(), &mut table.columns);
         }
         table.texels.extend(records(h - 1, 0.0));
         distribution::push_ends(&shares, &mut table.rows);

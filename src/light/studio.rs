@@ -131,11 +131,11 @@ mod tests {
                 assert!(row + 1 == h || (at(row + 1, column) - here).abs() < 0.35, "{row} {column}");
             }
         }
-        // At the poles all columns meet.
+        // At the poles all columns meet; the overhead box's edge is near.
         for row in [0, h - 1] {
             let values: Vec<f32> = (0..w).map(|column| at(row, column)).collect();
             let (low, high) = values.iter().fold((f32::MAX, 0.0_f32), |(l, u), &v| (l.min(v), u.max(v)));
-            assert!(high - low < 0.02 * high, "{low} {high}");
+            assert!(high - low < 0.04 * high, "{low} {high}");
         }
     }
 }

@@ -78,7 +78,7 @@ fn coverage(scene: &Scene, material: &Material) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::id::{ImageId, TextureId};
+    use crate::scene::{ImageId, TextureId};
     use crate::texture::{Filter, Image, Param, Texture, Wrap};
 
     fn scene(texels: Texels) -> Scene {

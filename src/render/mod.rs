@@ -8,7 +8,7 @@ mod prepare;
 mod schedule;
 mod settings;
 
-pub use default_light::{DefaultLightReport, LEAST_EMITTED};
+pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use frame::render;
 pub use framing::FRAMING_YFOV;
 pub use prepare::{Prepared, prepare};
