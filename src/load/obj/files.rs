@@ -72,7 +72,11 @@ pub(super) struct Pictures {
 
 impl Pictures {
     /// Finds and decodes what `maps` name, each with the folder of its MTL file; the rest of the maps lack a picture.
-    pub fn load<'m>(folders: &Folders, maps: impl Iterator<Item = (&'m str, &'m Map)>, warn: &mut dyn FnMut(String)) -> Self {
+    pub fn load<'m>(
+        folders: &Folders,
+        maps: impl Iterator<Item = (&'m str, &'m Map)>,
+        warn: &mut dyn FnMut(String),
+    ) -> Self {
         let mut pictures = Self::default();
         let mut wanted: BTreeMap<PathBuf, &str> = BTreeMap::new();
         let mut seen = BTreeSet::new();

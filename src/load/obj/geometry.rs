@@ -106,7 +106,11 @@ impl Geometry {
             let line = text.bytes().get(first..).unwrap_or_default();
             let word = line.split(|b| b.is_ascii_whitespace()).next().unwrap_or_default();
             let problem = format!("not a Wavefront OBJ file: \"{}\" is no statement of one", statement::show(word));
-            return Err(LoadError::new(text.at(first), problem, "Lines begin with v, vt, vn, f, o, g, usemtl and the like."));
+            return Err(LoadError::new(
+                text.at(first),
+                problem,
+                "Lines begin with v, vt, vn, f, o, g, usemtl and the like.",
+            ));
         }
         Ok(())
     }

@@ -155,8 +155,9 @@ mod tests {
 
     #[test]
     fn options_take_their_values_and_leave_the_name() {
-        let (map, problems) =
-            parse(r"-s 2 3 1 -o 0.25 0.5 -mm 0.1 0.8 -bm 0.2 -clamp on -blendu off -texres 512 -imfchan r a b\c 01.png");
+        let (map, problems) = parse(
+            r"-s 2 3 1 -o 0.25 0.5 -mm 0.1 0.8 -bm 0.2 -clamp on -blendu off -texres 512 -imfchan r a b\c 01.png",
+        );
         let map = map.unwrap();
         assert_eq!(map.file, r"a b\c 01.png");
         assert_eq!((map.scale, map.offset), ([2.0, 3.0], [0.25, 0.5]));
@@ -168,7 +169,7 @@ mod tests {
         assert_eq!(parse("-bm 7").0.map(|m| m.file), Some("7".into()));
         assert_eq!(parse("\"my tex.png\"").0.map(|m| m.file), Some("my tex.png".into()));
         assert!(parse("-s 1 1 1").0.is_none_or(|m| m.file == "1"));
-        assert!(parse("").0.is_none());
+        assert!(parse("\n").0.is_none());
         assert_eq!(parse("-t 1 1 1 x.png").1.len(), 1);
         assert_eq!(parse("-nonsense x.png").1.len(), 1);
     }

@@ -97,7 +97,11 @@ impl Converter<'_> {
         self.builder.warn(format!("{}: \"{}\": {what}", self.w.at, self.w.name));
     }
 
-    fn texture(&mut self, map: Option<&super::map::Map>, meaning: Meaning) -> Option<(crate::texture::TextureRef, f32)> {
+    fn texture(
+        &mut self,
+        map: Option<&super::map::Map>,
+        meaning: Meaning,
+    ) -> Option<(crate::texture::TextureRef, f32)> {
         self.textures.get(self.builder, self.folder, map?, meaning)
     }
 

@@ -126,9 +126,7 @@ impl Loader<'_> {
                 Err(why) => match line.split_whitespace().collect::<Vec<_>>()[..] {
                     [] => Vec::new(),
                     [_] => vec![(whole.to_owned(), Err(why))],
-                    ref names => {
-                        names.iter().map(|n| ((*n).to_owned(), files::find(&self.folders, "", n))).collect()
-                    }
+                    ref names => names.iter().map(|n| ((*n).to_owned(), files::find(&self.folders, "", n))).collect(),
                 },
             };
             for (name, found) in found {
@@ -199,7 +197,8 @@ impl Loader<'_> {
         }
         if let Some((_, first)) = lost.first() {
             let names = shown(lost.iter().map(|(name, _)| name.as_str()));
-            let text = format!("{}: no MTL file that was found has the material {names}: the default", self.text.at(*first));
+            let text =
+                format!("{}: no MTL file that was found has the material {names}: the default", self.text.at(*first));
             self.builder.warn(text);
         }
         made
@@ -223,9 +222,8 @@ impl Loader<'_> {
             .collect();
         let build = |&(part, made): &(&Part, Made)| mesh::build(&geometry, part, made.id, made.reads_textures);
         let built: Vec<mesh::Built> = wanted.par_iter().map(build).collect();
-        let names = |lost: &dyn Fn(&mesh::Built) -> bool| {
-            shown(built.iter().filter(|b| lost(b)).map(|b| b.mesh.name.as_str()))
-        };
+        let names =
+            |lost: &dyn Fn(&mesh::Built) -> bool| shown(built.iter().filter(|b| lost(b)).map(|b| b.mesh.name.as_str()));
         let crossed: usize = built.iter().map(|b| b.crossed).sum();
         let bare: usize = built.iter().map(|b| b.without_uvs).sum();
         let mut warnings = Vec::new();
@@ -235,7 +233,8 @@ impl Loader<'_> {
         }
         if bare > 0 {
             let names = names(&|b| b.without_uvs > 0);
-            warnings.push(format!("{bare} vertices below textures have no texture coordinates: taken as 0 (in {names})"));
+            warnings
+                .push(format!("{bare} vertices below textures have no texture coordinates: taken as 0 (in {names})"));
         }
         if built.iter().any(|b| b.half_coloured) {
             let names = names(&|b| b.half_coloured);

@@ -132,7 +132,8 @@ impl Reader<'_> {
             // Ambient light has no meaning where light is traced; anti-aliasing and sharpness are the renderer's.
             "ka" | "map_ka" | "map_aat" | "sharpness" | "km" | "nf" => {}
             // Without effect at their defaults, which exporters like to write out.
-            "ps" | "pc" | "pcr" | "aniso" | "anisor" if words.clone().all(|w| number(w).is_some_and(|n| n.0 == 0.0)) => {}
+            "ps" | "pc" | "pcr" | "aniso" | "anisor"
+                if words.clone().all(|w| number(w).is_some_and(|n| n.0 == 0.0)) => {}
             "tf" if words.clone().all(|w| number(w).is_some_and(|n| n.0 == 1.0)) => {}
             "ps" | "pc" | "pcr" | "aniso" | "anisor" | "tf" | "kt" | "map_ps" | "map_pc" | "map_pcr" | "map_tr"
             | "map_tf" | "disp" | "map_disp" | "decal" | "refl" | "map_refl" => m.ignored.push(key.to_owned()),
@@ -160,7 +161,10 @@ impl Reader<'_> {
                 Some([one; 3])
             }
             _ => {
-                self.warn(start, format!("{key} has {} numbers where three are needed; this line is ignored", values.len()));
+                self.warn(
+                    start,
+                    format!("{key} has {} numbers where three are needed; this line is ignored", values.len()),
+                );
                 None
             }
         }

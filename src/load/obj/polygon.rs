@@ -156,7 +156,8 @@ impl Ears {
             }
         }
         out.push([self.previous[at as usize], at, self.next[at as usize]]);
-        true
+        // Of a polygon that crosses itself, what is left may be turned over.
+        self.turn(at) >= 0.0
     }
 
     /// Drops corners from `reflex` that are cut off or have become convex.
@@ -228,7 +229,10 @@ mod tests {
 
     #[test]
     fn quadrilaterals_take_the_inner_then_the_shorter_diagonal() {
-        assert_eq!(split(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]).0, [[0, 1, 2], [0, 2, 3]]);
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 1e4));
+        let mut out = Vec::new();
+        assert!(triangulate(&square, &mut out));
+        assert_eq!(out, [[0, 1, 2], [0, 2, 3]], "of equal diagonals the first");
         assert_eq!(split(&[[0.0, 0.0], [1.0, 0.0], [3.0, 2.0], [0.0, 1.0]]).0, [[0, 1, 3], [1, 2, 3]]);
         // An arrow head: only the diagonal through its notch lies inside.
         let arrow = [[0.0, 0.0], [2.0, -1.0], [0.5, 0.0], [2.0, 1.0]];
@@ -269,8 +273,16 @@ mod tests {
         assert_eq!(split(&twice).2, 4.0);
         // A square with a square hole, cut open along one line.
         let hole = [
-            [0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0],
-            [1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0], [1.0, 1.0],
+            [0.0, 0.0],
+            [4.0, 0.0],
+            [4.0, 4.0],
+            [0.0, 4.0],
+            [0.0, 0.0],
+            [1.0, 1.0],
+            [1.0, 3.0],
+            [3.0, 3.0],
+            [3.0, 1.0],
+            [1.0, 1.0],
         ];
         let (_, well, area) = split(&hole);
         assert!(well && area == 12.0, "{area}");
@@ -279,7 +291,7 @@ mod tests {
     #[test]
     fn what_is_no_simple_polygon_falls_back_to_a_fan() {
         let crossed = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0], [-3.0, 1.0]];
-        split(&crossed);
+        assert!(!split(&crossed).1);
         assert!(!split(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]).1);
         assert!(!split(&[[f64::NAN, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [5.0, 5.0]]).1);
         // All in one line: triangles without area, which the scene's check drops.

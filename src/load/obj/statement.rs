@@ -207,7 +207,11 @@ impl Piece<'_> {
             }
             let Some((value, whole)) = number(word) else {
                 let problem = format!("\"{}\" is not a number", show(word));
-                return Err(Fault { offset: words.start, problem, fix: "A coordinate is a number such as 1.5 or 2e-3." });
+                return Err(Fault {
+                    offset: words.start,
+                    problem,
+                    fix: "A coordinate is a number such as 1.5 or 2e-3.",
+                });
             };
             if !whole {
                 self.faces.note(Note::NumberTails, words.start);
@@ -294,10 +298,9 @@ impl Piece<'_> {
         }
         match parts.next() {
             None => Ok(corner),
-            Some(_) => Err((
-                format!("\"{}\" has more than two slashes", show(word)),
-                "A corner is v, v/vt, v//vn or v/vt/vn.",
-            )),
+            Some(_) => {
+                Err((format!("\"{}\" has more than two slashes", show(word)), "A corner is v, v/vt, v//vn or v/vt/vn."))
+            }
         }
     }
 
@@ -311,7 +314,8 @@ impl Piece<'_> {
             digits => (false, digits),
         };
         let add = |n: usize, d: &u8| Some(n.saturating_mul(10).saturating_add(usize::from(*d)));
-        let value = digits.iter().map(|b| b.wrapping_sub(b'0')).try_fold(0, |n, d| if d < 10 { add(n, &d) } else { None });
+        let value =
+            digits.iter().map(|b| b.wrapping_sub(b'0')).try_fold(0, |n, d| if d < 10 { add(n, &d) } else { None });
         let Some(value) = value.filter(|_| !digits.is_empty()) else {
             let problem = format!("\"{}\" is not an index", show(part));
             return Err((problem, "A corner is v, v/vt, v//vn or v/vt/vn, each a whole number."));

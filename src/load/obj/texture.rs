@@ -96,7 +96,9 @@ impl Textures {
     }
 
     fn is_gray(&self, path: &std::path::Path) -> bool {
-        self.pictures.get(path).is_some_and(|p| (0..p.texels.len()).map(|i| p.texels.get(i)).all(|[r, g, b, _]| r == g && g == b))
+        self.pictures
+            .get(path)
+            .is_some_and(|p| (0..p.texels.len()).map(|i| p.texels.get(i)).all(|[r, g, b, _]| r == g && g == b))
     }
 
     /// Makes the pictures that were asked for.
@@ -149,7 +151,9 @@ fn derive(picture: &Picture, meaning: Meaning, channel: Option<Channel>, [base, 
     let srgb = |v: f32| srgb_from_linear(f64::from(v)) as f32;
     let linear = |v: f32| linear_from_srgb(f64::from(v)) as f32;
     let texel = |t: [f32; 4]| match meaning {
-        Meaning::Color | Meaning::Emission => [0, 1, 2, 3].map(|k| if k < 3 { srgb(in_range(linear(t[k]))) } else { t[k] }),
+        Meaning::Color | Meaning::Emission => {
+            [0, 1, 2, 3].map(|k| if k < 3 { srgb(in_range(linear(t[k]))) } else { t[k] })
+        }
         Meaning::LinearColor => [0, 1, 2, 3].map(|k| if k < 3 { srgb(in_range(t[k])) } else { t[k] }),
         // Which channel a slot reads differs: without `-imfchan` each keeps its own.
         Meaning::Scalar if channel.is_none() => t.map(in_range),
