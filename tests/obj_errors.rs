@@ -23,9 +23,9 @@ fn geometry_that_leads_nowhere_is_refused_with_line_and_column() {
     refused(&format!("{TRIANGLE}f 1 2 0\n"), "4:7", &["vertex index is 0", "count from 1"]);
     refused(&format!("{TRIANGLE}f 1 2 4\n"), "4:7", &["index is 4", "there are 3"]);
     refused(&format!("{TRIANGLE}f -1 -2 -4\n"), "4:9", &["index is -4", "up to this line"]);
-    refused(&format!("{TRIANGLE}f 1/1 2/1 3/1\n"), "4:3", &["texture coordinate index is 1", "there are 0"]);
-    refused(&format!("{TRIANGLE}f 1//9 2//1 3//1\n"), "4:3", &["normal index is 9"]);
-    refused(&format!("{TRIANGLE}f 1/1/1/1 2 3\n"), "4:3", &["two slashes"]);
+    refused(&format!("{TRIANGLE}vt 0 0\nf 1/2 2/1 3/1\n"), "5:3", &["texture coordinate index is 2", "there are 1"]);
+    refused(&format!("{TRIANGLE}vn 0 0 1\nf 1//9 2//1 3//1\n"), "5:3", &["normal index is 9"]);
+    refused(&format!("{TRIANGLE}f 1///1 2 3\n"), "4:3", &["two slashes"]);
     refused(&format!("{TRIANGLE}f one 2 3\n"), "4:3", &["\"one\" is not an index"]);
     refused(&format!("{TRIANGLE}f 99999999999999999999999 2 3\n"), "4:3", &["99999999999999999999999"]);
     refused("v 0 0\n", "1:1", &["v has 2 numbers", "Three"]);
@@ -56,6 +56,8 @@ fn what_is_not_drawn_is_counted() {
     says("7:1", "2 statements of free-form");
     says("10:1", "1 lines that are no statements");
     says("11:1", "1 smoothing groups");
+    let scene = load_obj(format!("{TRIANGLE}f 1/1/1 2/2/2 3/3/3\n")).unwrap();
+    assert!(scene.meshes[0].normals.is_none() && scene.warnings[0].contains("4:3: 6 indices"), "{:?}", scene.warnings);
     assert!(load_obj("# nothing\n").unwrap().triangle_count() == 0);
 }
 
@@ -180,7 +182,7 @@ fn damaged_files_never_panic() {
         let files = Files::new(RICH, &[("m.mtl", RICH_MTL.as_bytes()), ("t.png", &texture)]);
         let clean = files.load().unwrap();
         assert!(
-            clean.triangle_count() == 10 && clean.images.len() > 3,
+            clean.triangle_count() == 9 && clean.images.len() > 3,
             "{} {:?}",
             clean.triangle_count(),
             clean.warnings

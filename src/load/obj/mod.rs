@@ -111,6 +111,7 @@ impl Loader<'_> {
         warn(Note::MoreNumbers, "lines with more numbers than their kind has: those are ignored");
         warn(Note::OtherFiles, "statements that call other files: ignored");
         warn(Note::SmoothWords, "smoothing groups that are neither a number nor off: taken as off");
+        warn(Note::AbsentLists, "indices of texture coordinates or normals in a file that has none: ignored");
         warn(Note::Unknown, "lines that are no statements of OBJ: ignored");
     }
 

@@ -27,15 +27,21 @@ pub(super) fn triangulate(points: &[DVec3], out: &mut Vec<[u32; 3]>) -> bool {
             true
         }
         n => {
-            let flat = project(points);
+            let normal = newell(points);
+            if normal == DVec3::ZERO {
+                // All in one line, or what turns left and what turns right cancel out.
+                out.extend((1..n as u32 - 1).map(|i| [0, i, i + 1]));
+                let fan = points.windows(2).skip(1);
+                return fan.map(|p| (p[0] - points[0]).cross(p[1] - points[0])).all(|area| area == DVec3::ZERO);
+            }
+            let flat = project(points, normal);
             if n == 4 && quadrilateral(points, &flat, out) { true } else { Ears::new(flat).clip(out) }
         }
     }
 }
 
 /// The polygon in a plane, counter-clockwise if it is simple.
-fn project(points: &[DVec3]) -> Vec<DVec2> {
-    let normal = newell(points);
+fn project(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let size = normal.abs();
     let (axis, along) = match () {
         () if size.x >= size.y && size.x >= size.z => (0, normal.x),
