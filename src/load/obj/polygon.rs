@@ -116,14 +116,18 @@ impl Ears {
         let previous: Vec<u32> = (0..n).map(|i| (i + n - 1) % n).collect();
         let tests = TESTS_PER_CORNER * flat.len();
         let mut ears = Self { flat, next, previous, reflex: Vec::new(), tests };
-        // Negated, so that corners that are not finite count as reflex.
-        ears.reflex = (0..n).filter(|&i| !(ears.turn(i) > 0.0)).collect();
+        ears.reflex = (0..n).filter(|&i| !ears.is_convex(i)).collect();
         ears
     }
 
     fn turn(&self, i: u32) -> f64 {
         let at = |i: u32| self.flat[i as usize];
         side(at(self.previous[i as usize]), at(i), at(self.next[i as usize]))
+    }
+
+    /// Corners that are not finite are not.
+    fn is_convex(&self, i: u32) -> bool {
+        self.turn(i) > 0.0
     }
 
     fn clip(mut self, out: &mut Vec<[u32; 3]>) -> bool {
@@ -145,7 +149,7 @@ impl Ears {
                 (idle, strictness) = (0, Strictness::Clear);
                 // Going on beyond the neighbour keeps the triangles from becoming one fan of slivers.
                 at = self.next[next as usize];
-                if left % 16 == 0 {
+                if left.is_multiple_of(16) {
                     self.forget_convex();
                 }
                 continue;
@@ -169,7 +173,7 @@ impl Ears {
     /// Drops corners from `reflex` that are cut off or have become convex.
     fn forget_convex(&mut self) {
         let mut reflex = std::mem::take(&mut self.reflex);
-        reflex.retain(|&i| self.is_left(i) && !(self.turn(i) > 0.0));
+        reflex.retain(|&i| self.is_left(i) && !self.is_convex(i));
         self.reflex = reflex;
     }
 
@@ -178,12 +182,11 @@ impl Ears {
     }
 
     fn is_ear(&mut self, i: u32, strictness: Strictness) -> bool {
-        let turn = self.turn(i);
         if strictness == Strictness::Flat {
             self.tests = self.tests.saturating_sub(1);
-            return turn == 0.0;
+            return self.turn(i) == 0.0;
         }
-        if !(turn > 0.0) {
+        if !self.is_convex(i) {
             self.tests = self.tests.saturating_sub(1);
             return false;
         }

@@ -63,7 +63,7 @@ impl Text {
         while begin < bytes.len() {
             let mut end = (begin + size).min(bytes.len());
             // A newline behind a backslash may continue its line: cut at the next one.
-            while end < bytes.len() && !(bytes[end - 1] == b'\n' && !continues(&bytes[begin..end - 1])) {
+            while end < bytes.len() && (bytes[end - 1] != b'\n' || continues(&bytes[begin..end - 1])) {
                 end += 1;
             }
             pieces.push(Lines { rest: &bytes[begin..end], offset: begin });
