@@ -177,6 +177,7 @@ fn flatten(
     let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
     // Mean over channels: what its share of the light samples follows.
     let average = emission.iter().sum::<f64>() / 3.0;
+    let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
     let mut mesh_area = 0.0;
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {

@@ -33,7 +33,7 @@ pub(super) fn find(folders: &Folders, folder: &str, name: &str) -> Result<Found,
         _ => format!("{folder}/{path}"),
     };
     // A drive letter is no relative path either.
-    let is_relative = !path.starts_with('/') && !path.as_bytes().get(1).is_some_and(|b| *b == b':');
+    let is_relative = !path.starts_with('/') && path.as_bytes().get(1) != Some(&b':');
     let mut why = match is_relative {
         true => String::new(),
         false => "is absolute; files are read below the input's own folder or --asset-root DIR".to_owned(),

@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(parse("-bm 7").0.map(|m| m.file), Some("7".into()));
         assert_eq!(parse("\"my tex.png\"").0.map(|m| m.file), Some("my tex.png".into()));
         assert!(parse("-s 1 1 1").0.is_none_or(|m| m.file == "1"));
-        assert!(parse("").0.is_none());
+        assert!(parse("\n").0.is_none());
         assert_eq!(parse("-t 1 1 1 x.png").1.len(), 1);
         assert_eq!(parse("-nonsense x.png").1.len(), 1);
     }

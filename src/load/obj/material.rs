@@ -174,7 +174,7 @@ impl Converter<'_> {
         if ke.iter().any(|c| *c < 0.0 || !c.is_finite()) {
             self.warn("Ke must be at least 0 and finite: cut off there");
         }
-        let factor = ke.map(|c| c.max(0.0).min(f32::MAX));
+        let factor = ke.map(|c| if c.is_nan() { 0.0 } else { c.clamp(0.0, f32::MAX) });
         m.emission = Param { factor, texture: texture.map(|t| t.0) };
     }
 

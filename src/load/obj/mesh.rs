@@ -78,8 +78,7 @@ fn colors(geometry: &Geometry, sources: &[[u32; 3]]) -> (Option<Vec<[f32; 4]>>, 
     if coloured < sources.len() {
         return (None, coloured > 0);
     }
-    // `max` first: NaN becomes 0.
-    let linear = |c: f32| linear_from_srgb(f64::from(c.max(0.0).min(1.0))) as f32;
+    let linear = |c: f32| linear_from_srgb(if c.is_nan() { 0.0 } else { f64::from(c.clamp(0.0, 1.0)) }) as f32;
     let colors = sources.iter().map(of).map(|[r, g, b]| [linear(r), linear(g), linear(b), 1.0]);
     (Some(colors.collect()), false)
 }

@@ -30,7 +30,7 @@ use statement::Note;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use text::Text;
+use text::{Places, Text};
 
 /// Names listed in a warning.
 const NAMES_SHOWN: usize = 5;
@@ -111,14 +111,16 @@ impl Loader<'_> {
         warn(Note::MoreNumbers, "lines with more numbers than their kind has: those are ignored");
         warn(Note::OtherFiles, "statements that call other files: ignored");
         warn(Note::SmoothWords, "smoothing groups that are neither a number nor off: taken as off");
+        warn(Note::AbsentLists, "indices of texture coordinates or normals in a file that has none: ignored");
         warn(Note::Unknown, "lines that are no statements of OBJ: ignored");
     }
 
     /// Reads the MTL files; of two materials with one name the first counts.
     fn libraries(&mut self, geometry: &Geometry) {
         let mut read: Vec<PathBuf> = Vec::new();
+        let mut places = Places::default();
         for (line, offset) in &geometry.libraries {
-            let at = self.text.at(*offset);
+            let at = places.at(self.text, *offset);
             let whole = line.trim_matches('"');
             let found = match files::find(&self.folders, "", whole) {
                 Ok(found) => vec![(whole.to_owned(), Ok(found))],

@@ -3,7 +3,8 @@
 
 use super::map::{self, Map};
 use super::statement::show;
-use super::text::{Line, Text, Words, name_of, number};
+use super::text::{Line, Places, Text, Words, name_of, number};
+use std::collections::HashSet;
 
 /// A material as written; `None` = not said.
 #[derive(Clone, Debug, Default)]
@@ -57,7 +58,8 @@ impl Maps {
 
 /// The materials of a file, and what was wrong.
 pub(super) fn read(text: &Text) -> (Vec<Written>, Vec<String>) {
-    let mut reader = Reader { text, materials: Vec::new(), warnings: Vec::new() };
+    let (materials, warnings, names) = (Vec::new(), Vec::new(), HashSet::new());
+    let mut reader = Reader { text, places: Places::default(), line: String::new(), materials, warnings, names };
     for line in text.lines() {
         reader.line(&line);
     }
@@ -69,15 +71,21 @@ const MOST_WARNINGS: usize = 50;
 
 struct Reader<'t> {
     text: &'t Text,
+    places: Places,
+    /// File and place of the statement's key.
+    line: String,
+    /// Of the materials.
+    names: HashSet<String>,
     materials: Vec<Written>,
     warnings: Vec<String>,
 }
 
 impl Reader<'_> {
-    fn warn(&mut self, offset: usize, what: impl std::fmt::Display) {
+    /// Warns of the current statement.
+    fn warn(&mut self, what: impl std::fmt::Display) {
         match self.warnings.len() {
-            n if n < MOST_WARNINGS => self.warnings.push(format!("{}: {what}", self.text.at(offset))),
-            MOST_WARNINGS => self.warnings.push(format!("{}: more like these", self.text.at(offset))),
+            n if n < MOST_WARNINGS => self.warnings.push(format!("{}: {what}", self.line)),
+            MOST_WARNINGS => self.warnings.push(format!("{}: more like these", self.line)),
             _ => {}
         }
     }
@@ -88,26 +96,26 @@ impl Reader<'_> {
         if key.starts_with(b"#") {
             return;
         }
-        let (start, key) = (words.start, name_of(key));
+        let key = name_of(key);
+        self.line = self.places.at(self.text, words.start).to_string();
         if key.eq_ignore_ascii_case("newmtl") {
             let name = name_of(words.rest());
             if name.is_empty() {
-                self.warn(start, "newmtl without a name");
-            } else if self.materials.iter().any(|m| m.name == name) {
-                self.warn(start, format!("\"{name}\" is there twice: the first is used"));
+                self.warn("newmtl without a name");
+            } else if !self.names.insert(name.clone()) {
+                self.warn(format!("\"{name}\" is there twice: the first is used"));
             }
-            let at = self.text.at(start).to_string();
-            self.materials.push(Written { name, at, ..Written::default() });
+            self.materials.push(Written { name, at: self.line.clone(), ..Written::default() });
             return;
         }
         let Some(mut material) = self.materials.pop() else {
-            return self.warn(start, format!("{key} before the first newmtl: ignored"));
+            return self.warn(format!("{key} before the first newmtl: ignored"));
         };
-        self.statement(&mut material, &key, start, &mut words);
+        self.statement(&mut material, &key, &mut words);
         self.materials.push(material);
     }
 
-    fn statement(&mut self, m: &mut Written, key: &str, start: usize, words: &mut Words) {
+    fn statement(&mut self, m: &mut Written, key: &str, words: &mut Words) {
         // Writers do not agree on upper and lower case.
         match key.to_ascii_lowercase().as_str() {
             "kd" => set(&mut m.kd, self.color(key, words)),
@@ -120,15 +128,15 @@ impl Reader<'_> {
             "illum" => set(&mut m.illum, self.number(key, words)),
             "pr" => set(&mut m.pr, self.number(key, words)),
             "pm" => set(&mut m.pm, self.number(key, words)),
-            "map_kd" => set(&mut m.maps.kd, self.map(key, start, words)),
-            "map_ks" => set(&mut m.maps.ks, self.map(key, start, words)),
-            "map_ke" => set(&mut m.maps.ke, self.map(key, start, words)),
-            "map_ns" => set(&mut m.maps.ns, self.map(key, start, words)),
-            "map_d" | "map_opacity" => set(&mut m.maps.d, self.map(key, start, words)),
-            "map_pr" => set(&mut m.maps.pr, self.map(key, start, words)),
-            "map_pm" => set(&mut m.maps.pm, self.map(key, start, words)),
-            "bump" | "map_bump" => set(&mut m.maps.bump, self.map(key, start, words)),
-            "norm" | "map_norm" | "map_kn" => set(&mut m.maps.norm, self.map(key, start, words)),
+            "map_kd" => set(&mut m.maps.kd, self.map(key, words)),
+            "map_ks" => set(&mut m.maps.ks, self.map(key, words)),
+            "map_ke" => set(&mut m.maps.ke, self.map(key, words)),
+            "map_ns" => set(&mut m.maps.ns, self.map(key, words)),
+            "map_d" | "map_opacity" => set(&mut m.maps.d, self.map(key, words)),
+            "map_pr" => set(&mut m.maps.pr, self.map(key, words)),
+            "map_pm" => set(&mut m.maps.pm, self.map(key, words)),
+            "bump" | "map_bump" => set(&mut m.maps.bump, self.map(key, words)),
+            "norm" | "map_norm" | "map_kn" => set(&mut m.maps.norm, self.map(key, words)),
             // Ambient light has no meaning where light is traced; anti-aliasing and sharpness are the renderer's.
             "ka" | "map_ka" | "map_aat" | "sharpness" | "km" | "nf" => {}
             // Without effect at their defaults, which exporters like to write out.
@@ -137,19 +145,18 @@ impl Reader<'_> {
             "tf" if words.clone().all(|w| number(w).is_some_and(|n| n.0 == 1.0)) => {}
             "ps" | "pc" | "pcr" | "aniso" | "anisor" | "tf" | "kt" | "map_ps" | "map_pc" | "map_pcr" | "map_tr"
             | "map_tf" | "disp" | "map_disp" | "decal" | "refl" | "map_refl" => m.ignored.push(key.to_owned()),
-            _ => self.warn(start, format!("\"{}\" is no statement of MTL: ignored", show(key.as_bytes()))),
+            _ => self.warn(format!("\"{}\" is no statement of MTL: ignored", show(key.as_bytes()))),
         }
     }
 
     /// Three numbers; one counts for all three.
     fn color(&mut self, key: &str, words: &mut Words) -> Option<[f32; 3]> {
-        let start = words.start;
         let mut values = Vec::new();
         for word in words.by_ref().take_while(|w| !w.starts_with(b"#")).take(3) {
             match number(word) {
                 Some((value, _)) if value.is_finite() => values.push(value),
                 _ => {
-                    self.warn(start, format!("{key} {}: not a number; this line is ignored", show(word)));
+                    self.warn(format!("{key} {}: not a number; this line is ignored", show(word)));
                     return None;
                 }
             }
@@ -157,25 +164,21 @@ impl Reader<'_> {
         match values[..] {
             [r, g, b] => Some([r, g, b]),
             [one] => {
-                self.warn(start, format!("{key} {one}: one number where three are usual; it counts for all three"));
+                self.warn(format!("{key} {one}: one number where three are usual; it counts for all three"));
                 Some([one; 3])
             }
             _ => {
-                self.warn(
-                    start,
-                    format!("{key} has {} numbers where three are needed; this line is ignored", values.len()),
-                );
+                self.warn(format!("{key} has {} numbers where three are needed; this line is ignored", values.len()));
                 None
             }
         }
     }
 
     fn number(&mut self, key: &str, words: &mut Words) -> Option<f32> {
-        let start = words.start;
         let word = words.next().unwrap_or_default();
         let value = number(word).map(|n| n.0).filter(|n| n.is_finite());
         if value.is_none() {
-            self.warn(start, format!("{key} \"{}\": not a number; this line is ignored", show(word)));
+            self.warn(format!("{key} \"{}\": not a number; this line is ignored", show(word)));
         }
         value
     }
@@ -184,19 +187,19 @@ impl Reader<'_> {
     fn dissolve(&mut self, words: &mut Words) -> Option<f32> {
         let mut ahead = words.clone();
         if ahead.next() == Some(b"-halo") {
-            self.warn(ahead.start, "d -halo: the halo is ignored, the number is used");
+            self.warn("d -halo: the halo is ignored, the number is used");
             *words = ahead;
         }
         self.number("d", words)
     }
 
-    fn map(&mut self, key: &str, start: usize, words: &mut Words) -> Option<Map> {
-        let (map, problems) = map::read(words, self.text.at(start).to_string());
+    fn map(&mut self, key: &str, words: &mut Words) -> Option<Map> {
+        let (map, problems) = map::read(words, self.line.clone());
         for problem in problems {
-            self.warn(start, format!("{key}: {problem}"));
+            self.warn(format!("{key}: {problem}"));
         }
         if map.is_none() {
-            self.warn(start, format!("{key} without a file name; this line is ignored"));
+            self.warn(format!("{key} without a file name; this line is ignored"));
         }
         map
     }
@@ -228,7 +231,7 @@ mod tests {
         assert_eq!((materials[0].kd, materials[0].ks, materials[0].d), (Some([0.5; 3]), None, Some(0.5)));
         assert!(materials[0].maps.kd.is_none() && materials[0].illum.is_none() && materials[0].ns.is_none());
         assert_eq!(materials[1].kd, Some([0.1, 0.2, 0.3]));
-        for place in ["1:1", "3:1", "4:1", "5:1", "6:1", "7:1", "8:3", "9:1", "10:1"] {
+        for place in ["1:1", "3:1", "4:1", "5:1", "6:1", "7:1", "8:1", "9:1", "10:1"] {
             let found = warnings.iter().filter(|w| w.starts_with(&format!("m.mtl: {place}: "))).count();
             assert_eq!(found, 1, "{place}: {warnings:?}");
         }

@@ -27,15 +27,21 @@ pub(super) fn triangulate(points: &[DVec3], out: &mut Vec<[u32; 3]>) -> bool {
             true
         }
         n => {
-            let flat = project(points);
+            let normal = newell(points);
+            if normal == DVec3::ZERO {
+                // All in one line, or what turns left and what turns right cancel out.
+                out.extend((1..n as u32 - 1).map(|i| [0, i, i + 1]));
+                let fan = points.windows(2).skip(1);
+                return fan.map(|p| (p[0] - points[0]).cross(p[1] - points[0])).all(|area| area == DVec3::ZERO);
+            }
+            let flat = project(points, normal);
             if n == 4 && quadrilateral(points, &flat, out) { true } else { Ears::new(flat).clip(out) }
         }
     }
 }
 
 /// The polygon in a plane, counter-clockwise if it is simple.
-fn project(points: &[DVec3]) -> Vec<DVec2> {
-    let normal = newell(points);
+fn project(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let size = normal.abs();
     let (axis, along) = match () {
         () if size.x >= size.y && size.x >= size.z => (0, normal.x),
@@ -110,14 +116,18 @@ impl Ears {
         let previous: Vec<u32> = (0..n).map(|i| (i + n - 1) % n).collect();
         let tests = TESTS_PER_CORNER * flat.len();
         let mut ears = Self { flat, next, previous, reflex: Vec::new(), tests };
-        // Negated, so that corners that are not finite count as reflex.
-        ears.reflex = (0..n).filter(|&i| !(ears.turn(i) > 0.0)).collect();
+        ears.reflex = (0..n).filter(|&i| !ears.is_convex(i)).collect();
         ears
     }
 
     fn turn(&self, i: u32) -> f64 {
         let at = |i: u32| self.flat[i as usize];
         side(at(self.previous[i as usize]), at(i), at(self.next[i as usize]))
+    }
+
+    /// Corners that are not finite are not.
+    fn is_convex(&self, i: u32) -> bool {
+        self.turn(i) > 0.0
     }
 
     fn clip(mut self, out: &mut Vec<[u32; 3]>) -> bool {
@@ -139,7 +149,7 @@ impl Ears {
                 (idle, strictness) = (0, Strictness::Clear);
                 // Going on beyond the neighbour keeps the triangles from becoming one fan of slivers.
                 at = self.next[next as usize];
-                if left % 16 == 0 {
+                if left.is_multiple_of(16) {
                     self.forget_convex();
                 }
                 continue;
@@ -156,13 +166,14 @@ impl Ears {
             }
         }
         out.push([self.previous[at as usize], at, self.next[at as usize]]);
-        true
+        // Of a polygon that crosses itself, what is left may be turned over.
+        self.turn(at) >= 0.0
     }
 
     /// Drops corners from `reflex` that are cut off or have become convex.
     fn forget_convex(&mut self) {
         let mut reflex = std::mem::take(&mut self.reflex);
-        reflex.retain(|&i| self.is_left(i) && !(self.turn(i) > 0.0));
+        reflex.retain(|&i| self.is_left(i) && !self.is_convex(i));
         self.reflex = reflex;
     }
 
@@ -171,12 +182,11 @@ impl Ears {
     }
 
     fn is_ear(&mut self, i: u32, strictness: Strictness) -> bool {
-        let turn = self.turn(i);
         if strictness == Strictness::Flat {
             self.tests = self.tests.saturating_sub(1);
-            return turn == 0.0;
+            return self.turn(i) == 0.0;
         }
-        if !(turn > 0.0) {
+        if !self.is_convex(i) {
             self.tests = self.tests.saturating_sub(1);
             return false;
         }
@@ -228,7 +238,10 @@ mod tests {
 
     #[test]
     fn quadrilaterals_take_the_inner_then_the_shorter_diagonal() {
-        assert_eq!(split(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]).0, [[0, 1, 2], [0, 2, 3]]);
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| DVec3::new(x, y, 1e4));
+        let mut out = Vec::new();
+        assert!(triangulate(&square, &mut out));
+        assert_eq!(out, [[0, 1, 2], [0, 2, 3]], "of equal diagonals the first");
         assert_eq!(split(&[[0.0, 0.0], [1.0, 0.0], [3.0, 2.0], [0.0, 1.0]]).0, [[0, 1, 3], [1, 2, 3]]);
         // An arrow head: only the diagonal through its notch lies inside.
         let arrow = [[0.0, 0.0], [2.0, -1.0], [0.5, 0.0], [2.0, 1.0]];
@@ -287,7 +300,7 @@ mod tests {
     #[test]
     fn what_is_no_simple_polygon_falls_back_to_a_fan() {
         let crossed = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0], [-3.0, 1.0]];
-        split(&crossed);
+        assert!(!split(&crossed).1);
         assert!(!split(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]).1);
         assert!(!split(&[[f64::NAN, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [5.0, 5.0]]).1);
         // All in one line: triangles without area, which the scene's check drops.

@@ -58,6 +58,7 @@ pub(super) enum Note {
     MoreNumbers,
     OtherFiles,
     SmoothWords,
+    AbsentLists,
     Unknown,
 }
 
@@ -271,7 +272,8 @@ impl Piece<'_> {
             if word.starts_with(b"#") {
                 break;
             }
-            let corner = self.corner(word).map_err(|(problem, fix)| Fault { offset: words.start, problem, fix })?;
+            let corner =
+                self.corner(word, words.start).map_err(|(problem, fix)| Fault { offset: words.start, problem, fix })?;
             self.faces.lacks_normals |= corner[2] == NONE;
             self.faces.corners.push(corner);
         }
@@ -286,13 +288,15 @@ impl Piece<'_> {
 
     /// `position/texture/normal`, the last two of which may be missing.
     #[inline]
-    fn corner(&self, word: &[u8]) -> Result<Corner, (String, &'static str)> {
+    fn corner(&mut self, word: &[u8], offset: usize) -> Result<Corner, (String, &'static str)> {
         let mut corner = [NONE; 3];
         let mut parts = word.split(|b| *b == b'/');
         for (k, index) in corner.iter_mut().enumerate() {
             match parts.next() {
                 None => break,
                 Some(b"") if k > 0 => {}
+                // Exporters write such indices out of habit; nothing is lost that was there.
+                Some(_) if k > 0 && self.known.total[k] == 0 => self.faces.note(Note::AbsentLists, offset),
                 Some(part) => *index = self.index(k, part)?,
             }
         }

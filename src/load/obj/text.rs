@@ -63,13 +63,36 @@ impl Text {
         while begin < bytes.len() {
             let mut end = (begin + size).min(bytes.len());
             // A newline behind a backslash may continue its line: cut at the next one.
-            while end < bytes.len() && !(bytes[end - 1] == b'\n' && !continues(&bytes[begin..end - 1])) {
+            while end < bytes.len() && (bytes[end - 1] != b'\n' || continues(&bytes[begin..end - 1])) {
                 end += 1;
             }
             pieces.push(Lines { rest: &bytes[begin..end], offset: begin });
             begin = end;
         }
         pieces
+    }
+}
+
+/// Finds places in the order of the text, so that a file with many of them is gone through once.
+#[derive(Default)]
+pub(super) struct Places {
+    /// How far newlines are counted.
+    offset: usize,
+    lines: usize,
+    /// Where the last line begins.
+    begin: usize,
+}
+
+impl Places {
+    /// [`Text::at`] for an offset that is not before the last one.
+    pub fn at(&mut self, text: &Text, offset: usize) -> SourceLoc {
+        let new = text.bytes().get(self.offset..offset).unwrap_or_default();
+        self.lines += new.iter().filter(|b| **b == b'\n').count();
+        if let Some(last) = new.iter().rposition(|b| *b == b'\n') {
+            self.begin = self.offset + last + 1;
+        }
+        self.offset = self.offset.max(offset);
+        SourceLoc::at(&text.file, format!("{}:{}", self.lines + 1, offset.saturating_sub(self.begin) + 1))
     }
 }
 
@@ -248,6 +271,10 @@ mod tests {
         let mut words = line.words();
         words.nth(2);
         assert_eq!(text.at(words.start).place, "2:6");
+        let mut places = Places::default();
+        for offset in 0..text.bytes().len() {
+            assert_eq!(places.at(&text, offset), text.at(offset), "{offset}");
+        }
     }
 
     #[test]
