@@ -142,9 +142,8 @@ impl<L: Lanes> Bsdf<L> {
         }
     }
 
-    /// The same with the diffuse lobe about the world normal `normal` (unit) in `lanes` that have two lobes: the specular
-    /// lobe's normal may
-    /// have been bent for its mirror's sake, which is no matter of the diffuse one.
+    /// The same with the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the
+    /// specular one's normal may have been bent for its mirror's sake, which is no matter of the diffuse one.
     #[inline(always)]
     pub fn with_diffuse_normal(self, normal: V3<L>, lanes: L::M) -> Self {
         let lanes = lanes & !self.is_diffuse;
