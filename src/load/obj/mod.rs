@@ -19,6 +19,7 @@ mod texture;
 mod vertices;
 
 use super::folders::{Folders, read_file};
+use super::tangents::{self, TooManyTriangles};
 use super::{LoadOptions, LoadTimes};
 use crate::error::{LoadError, SourceLoc};
 use crate::scene::{Instance, MaterialId, Scene, SceneBuilder};
@@ -66,7 +67,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), Lo
     loader.notes(&geometry);
     loader.libraries(&geometry);
     let mut decode = 0.0;
-    let materials = loader.materials(&geometry, &mut decode);
+    let materials = loader.materials(&geometry, options, &mut decode);
     loader.meshes(geometry, &materials, options);
     let scene = loader.builder.finish();
     let total = start.elapsed().as_secs_f64();
@@ -165,7 +166,7 @@ impl Loader<'_> {
 
     /// The materials that faces use, with their textures, in the order of [`Geometry::materials`]; seconds of decoding are
     /// added to `decode`. `None`: in no file.
-    fn materials(&mut self, geometry: &Geometry, decode: &mut f64) -> Vec<Option<Made>> {
+    fn materials(&mut self, geometry: &Geometry, options: &LoadOptions, decode: &mut f64) -> Vec<Option<Made>> {
         for place in geometry.parts.iter().filter_map(|part| part.material) {
             if let Some(entry) = self.library.get_mut(&geometry.materials[place].0) {
                 entry.is_used = true;
@@ -183,7 +184,9 @@ impl Loader<'_> {
         for (name, offset) in &geometry.materials {
             let entry = self.library.get(name);
             made.push(entry.filter(|entry| entry.is_used).map(|entry| {
-                let material = material::convert(&entry.written, &entry.folder, &mut textures, &mut self.builder);
+                let mut material = material::convert(&entry.written, &entry.folder, &mut textures, &mut self.builder);
+                // Heights are in the file's units, like its vertices.
+                material.bump.factor *= options.obj_scale.unwrap_or(1.0) as f32;
                 let reads_textures = material.textures().next().is_some();
                 Made { id: self.builder.add_material(material), reads_textures }
             }));
@@ -206,6 +209,19 @@ impl Loader<'_> {
         made
     }
 
+    /// Gives meshes tangents whose material has a normal map.
+    fn add_tangents(&mut self, wanted: &[(&Part, Made)], built: &mut [mesh::Built]) {
+        for ((_, made), b) in wanted.iter().zip(built) {
+            let Some(map) = self.builder.material(made.id).normal.texture else { continue };
+            if let Err(TooManyTriangles(n)) = tangents::generate(&mut b.mesh, map.uv_set as usize, map.transform) {
+                let name = &b.mesh.name;
+                let text =
+                    format!("{name}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
+                self.builder.warn(text);
+            }
+        }
+    }
+
     /// Builds and places a mesh for each part.
     fn meshes(&mut self, geometry: Geometry, materials: &[Option<Made>], options: &LoadOptions) {
         let mut defaults: HashMap<bool, MaterialId> = HashMap::new();
@@ -223,7 +239,8 @@ impl Loader<'_> {
             })
             .collect();
         let build = |&(part, made): &(&Part, Made)| mesh::build(&geometry, part, made.id, made.reads_textures);
-        let built: Vec<mesh::Built> = wanted.par_iter().map(build).collect();
+        let mut built: Vec<mesh::Built> = wanted.par_iter().map(build).collect();
+        self.add_tangents(&wanted, &mut built);
         let names =
             |lost: &dyn Fn(&mesh::Built) -> bool| shown(built.iter().filter(|b| lost(b)).map(|b| b.mesh.name.as_str()));
         let crossed: usize = built.iter().map(|b| b.crossed).sum();

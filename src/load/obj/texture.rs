@@ -109,11 +109,20 @@ impl Textures {
             Some(derive(pictures.get(&recipe.path)?, meaning, channel, range))
         };
         let derived: Vec<Option<Picture>> = self.recipes.par_iter().map(make).collect();
+        let mut found = Vec::with_capacity(derived.len());
         for (recipe, derived) in self.recipes.iter().zip(derived) {
             let picture = derived.or_else(|| self.pictures.take(&recipe.path));
-            let Picture { width, height, texels } = picture.expect("each recipe's file was decoded, and is taken once");
-            let name = recipe.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            builder.add_image(Image { width, height, texels, name });
+            found.push(picture.expect("each recipe's file was decoded, and is taken once"));
+        }
+        let used = builder.channels();
+        let narrow = |(i, Picture { width, height, texels }): (usize, Picture)| {
+            let texels = texels.narrowed(used.get(i).copied().unwrap_or_default());
+            let name = self.recipes[i].path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            Image { width, height, texels, name }
+        };
+        let images: Vec<Image> = found.into_par_iter().enumerate().map(narrow).collect();
+        for image in images {
+            builder.add_image(image);
         }
     }
 }
