@@ -106,7 +106,7 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         refused(root.path(), &["a.gltf", option, "-1"], 2, &[&format!("{option} is not built yet")]);
         refused(root.path(), &["render", option, "1", "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
-    for option in ["--cull-backfaces", "--transparent", "--texture-lod", "--explain", "--strict"] {
+    for option in ["--transparent", "--strict", "--texture-lod", "--explain"] {
         refused(root.path(), &[option, "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
     for command in ["bench", "verify", "retone", "doctor"] {

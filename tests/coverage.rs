@@ -223,6 +223,30 @@ fn every_backend_and_number_of_threads_decides_the_same() {
 }
 
 #[test]
+fn culled_backs_let_camera_rays_pass_and_still_cast_shadows() {
+    // A single-sided ceiling with its front down, seen from above: gone for the camera, there for the sun.
+    let ceiling = Material { double_sided: false, ..scenes::lambert(0.0) };
+    let lamp = Material { double_sided: true, ..scenes::lamp(0.0, 2.0) };
+    for (material, culled, expected) in [(&ceiling, true, 2.0), (&ceiling, false, 0.0), (&lamp, true, 2.0)] {
+        let mut builder = SceneBuilder::new(0);
+        let floor = builder.add_material(lamp.clone());
+        add_sheet(&mut builder, 0.0, 2.0, floor);
+        let above = builder.add_material(material.clone());
+        let h = 2.0;
+        scenes::add_quad(&mut builder, [[-h, 1.0, -h], [h, 1.0, -h], [h, 1.0, h], [-h, 1.0, h]], above);
+        builder.add_camera(camera_above(3.0, POINT_VIEW));
+        let settings = RenderSettings { cull_backfaces: culled, ..settings(4, 4, 0) };
+        assert!(shoot(&builder.finish(), &settings).pixels.iter().flatten().all(|&x| x == expected), "{culled}");
+    }
+    let mut scene = floor_under(&[ceiling], 0.0);
+    // The sheet's front is up, so turn it over.
+    scene.meshes[1].indices = vec![[0, 2, 1], [0, 3, 2]];
+    scene.cameras[0] = camera_above(3.0, POINT_VIEW);
+    let settings = RenderSettings { cull_backfaces: true, ..settings(4, 4, 0) };
+    assert!(shoot(&scene, &settings).pixels.iter().flatten().all(|&x| x == 0.0));
+}
+
+#[test]
 fn alpha_of_an_opaque_material_is_ignored() {
     assert_exactly("opaque", &floor_under(&[black(AlphaMode::Opaque, 0.0)], 0.0), 0.0);
 }

@@ -70,7 +70,7 @@ pub(super) fn png_bytes(frame: &Frame, tone: &ToneMap) -> (Vec<u8>, u64) {
 /// host, threads.
 fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, ExrValue)> {
     let stats = &frame.stats;
-    vec![
+    let mut attributes = vec![
         ("prt:version", ExrValue::Text(crate::VERSION.into())),
         // Text, because EXR has no 64-bit integer.
         ("prt:seed", ExrValue::Text(settings.seed.to_string())),
@@ -84,7 +84,11 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
         ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
         ("prt:truncated", ExrValue::Double(stats.truncated)),
         ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
-    ]
+    ];
+    if settings.cull_backfaces {
+        attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
+    }
+    attributes
 }
 
 /// The option's value that names a model.

@@ -55,6 +55,8 @@ pub struct PathTracer<'a> {
     pub max_bounces: u32,
     /// Whether reaching `max_bounces` counts as truncation (a safety cap) and not as the user's wish.
     pub is_capped: bool,
+    /// Whether camera rays pass single-sided surfaces from behind.
+    pub cull_backfaces: bool,
     /// Random numbers' seed.
     pub seed: u64,
     /// Frame number, part of the random numbers.

@@ -68,10 +68,15 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let si = interact::<L>(tables, pool, at, primitive, hit);
     let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
     let (mut t, mut through) = (L::F::load(&pool.hits.t, at), L::M::from_bits(0));
-    if tables.materials.has_alpha() {
+    let passable = tables.materials.has_alpha() || tracer.cull_backfaces;
+    if passable {
         t = t + L::F::load(&pool.travelled, at);
         let key = coverage_key::<L>(key.pixel, key.sample, depth);
         through = passes::<L>(tables, si.triangle.material, &si.uvs, si.opacity, key, primitive, hit);
+        if tracer.cull_backfaces {
+            let culled = depth.eq(L::U::splat(0)) & !si.front;
+            through = through | (tables.materials.single_sided::<L>(si.triangle.material, hit) & culled);
+        }
         hit = hit & !through;
     }
     if tables.materials.has_unlit() {
@@ -135,7 +140,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
 
     let mut next = Next { origin: start, direction: sample.wi, beta, pdf: sample.pdf, depth: depth + L::U::splat(1) };
     let to = pool.n;
-    if tables.materials.has_alpha() {
+    if passable {
         // Rays that pass go on as they were, from behind the surface.
         next = Next {
             origin: behind(&si.triangle, si.p, -si.wo).or_else(through, next.origin),

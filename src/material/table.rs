@@ -130,6 +130,12 @@ impl MaterialTable {
         active & self.record::<L>(material, 0)[3].to_bits().has(UNLIT)
     }
 
+    /// The lanes whose material has a front only.
+    #[inline(always)]
+    pub fn single_sided<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
+        active & !self.record::<L>(material, 0)[3].to_bits().has(DOUBLE_SIDED)
+    }
+
     /// Share of a surface that is there, in [0, 1]: 1 if opaque, 0 or 1 under a mask, else the opacity. `vertex` is the
     /// vertex colour's part of it.
     #[inline(always)]

@@ -75,6 +75,7 @@ fn render_here(
         },
         max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
         is_capped: settings.max_bounces.is_none(),
+        cull_backfaces: settings.cull_backfaces,
         seed: settings.seed,
         frame: settings.frame,
         level,

@@ -87,6 +87,8 @@ pub struct RenderSettings {
     pub frame: u32,
     /// Scatterings after the first; `None` = roulette alone ends paths (safety cap [`RenderSettings::BOUNCE_CAP`]).
     pub max_bounces: Option<u32>,
+    /// Camera rays pass single-sided surfaces from behind; other rays do not.
+    pub cull_backfaces: bool,
     /// Pixel filter.
     pub filter: Filter,
     /// Microfacet model.
@@ -118,6 +120,7 @@ impl Default for RenderSettings {
             seed: 0,
             frame: 0,
             max_bounces: None,
+            cull_backfaces: false,
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),

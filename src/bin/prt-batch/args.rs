@@ -102,6 +102,9 @@ pub struct RenderArgs {
     /// Microfacet model: appendix-b
     #[arg(long, value_name = "MODEL", default_value = "appendix-b", value_parser = parse::brdf)]
     pub brdf: Brdf,
+    /// Single-sided surfaces are invisible to camera rays from behind
+    #[arg(long)]
+    pub cull_backfaces: bool,
     /// Pixel filter: box or tent, :WIDTH = full support in pixels
     #[arg(long, value_name = "NAME[:WIDTH]", default_value = "tent:2", value_parser = parse::filter)]
     pub filter: Filter,

@@ -21,7 +21,6 @@ const OPTIONS: &[(&str, bool)] = &[
     ("focus-on", true),
     ("aperture-blades", true),
     ("sensor", true),
-    ("cull-backfaces", false),
     ("aov", true),
     ("transparent", false),
     ("texture-lod", false),

@@ -49,6 +49,7 @@ fn settings(args: &RenderArgs) -> BatchSettings {
         max_bounces: args.max_bounces,
         filter: args.filter,
         brdf: args.brdf,
+        cull_backfaces: args.cull_backfaces,
         default_light: args.default_light,
         accel: args.accel,
         embree_dirs: embree_dirs(),
