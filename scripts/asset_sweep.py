@@ -38,6 +38,23 @@ SHEET = [
     "EmissiveStrengthTest", "Duck", "FlightHelmet", "SheenChair", "Suzanne", "Spot",
 ]
 TIMEOUT = 300
+HEADING = """# What becomes of the sample assets
+
+Made by `scripts/asset_sweep.py --table docs/assets.md --sheet docs/assets.png`: every `.gltf`, `.glb` and `.obj` file of a set of
+sample assets (Khronos' sample models and asset generator, corpora of malformed files, models of loaders' tests), each
+rendered by a process of its own. *Validator errors* are those that the Khronos glTF validator finds. The assets
+themselves are not part of this repository.
+
+![contact sheet](assets.png)
+
+64 samples a pixel, the built-in studio, cameras framed on the bounds (TextureSettingsTest with `--cull-backfaces`,
+as its first row asks for). The pictured models are by their authors, most from Khronos' glTF-Sample-Assets: CC0
+(NormalTangentTest, TextureCoordinateTest, TextureEncodingTest, TextureTransformTest, BoxVertexColors, SimpleInstancing,
+TwoSidedPlane, MeshPrimitiveModes, CompareNormal and CompareRoughness, FlightHelmet, SheenChair, Suzanne, and Spot by
+Keenan Crane), CC-BY 4.0 (TextureSettingsTest, VertexColorTest, MultiUVTest, OrientationTest, AlphaBlendModeTest,
+UnlitTest, SpecularTest, EmissiveStrengthTest), and Duck under the SCEA Shared Source License; glTF is a mark of Khronos.
+
+"""
 
 
 def document(path):
@@ -181,12 +198,11 @@ def main():
     fine = sum(1 for r in valid if r["image"] and r["image"]["status"] != "failed")
     total = (f"{len(rows)} files: " + ", ".join(f"{n} {status}" for status, n in sorted(counts.items()))
              + f". Valid and requiring nothing unknown: {fine} of {len(valid)} rendered or empty.")
-    text = "\n".join(table) + f"\n\n{total}\n"
     if arguments.table:
         with open(arguments.table, "w") as file:
-            file.write(text)
+            file.write(f"{HEADING}{total}\n\n" + "\n".join(table) + "\n")
     else:
-        print(text, end="")
+        print("\n".join(table), total, sep="\n\n")
     if arguments.sheet:
         contact_sheet(rows, arguments.out, arguments.sheet, 160)
     wrong = [r for r in rows if r["wrong"]]
