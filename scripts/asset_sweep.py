@@ -118,13 +118,13 @@ def judge(row):
     return "" if os.path.basename(row["file"]) in message else f"the message does not say where: {message}"
 
 
-def outcome(row):
-    """One cell of the table."""
+def outcome(row, root):
+    """One cell of the table; paths are shown from `root`."""
     image = row["image"]
     if image is None:
         return "**" + row["said"].splitlines()[0] + "**"
     if image["status"] == "failed":
-        message = image["error_message"].splitlines()[0]
+        message = image["error_message"].splitlines()[0].replace(root + os.sep, "")
         return "refused: " + message[message.find(os.path.basename(row["file"])):].replace("|", "\\|")[:150]
     warnings = len(image["warnings"])
     return image["status"] + (f", {warnings} warning{'s' if warnings > 1 else ''}" if warnings else "")
@@ -192,7 +192,7 @@ def main():
     table = ["| file | validator errors | requires | outcome |", "|---|---|---|---|"]
     for row in rows:
         errors = "?" if row["errors"] < 0 else "-" if row["file"].lower().endswith(".obj") else row["errors"]
-        table.append(f"| {row['file']} | {errors} | {', '.join(row['required'])} | {outcome(row)} |")
+        table.append(f"| {row['file']} | {errors} | {', '.join(row['required'])} | {outcome(row, root)} |")
     counts = collections.Counter(r["image"]["status"] if r["image"] else "broken" for r in rows)
     valid = [r for r in rows if r["errors"] == 0 and not [e for e in r["required"] if e not in READ]]
     fine = sum(1 for r in valid if r["image"] and r["image"]["status"] != "failed")

@@ -280,7 +280,7 @@ fn unlit_shows_its_colour_to_the_camera_and_in_mirrors() {
 #[test]
 fn unlit_lights_nothing_and_blocks_light() {
     let white = unlit([1.0; 3]);
-    assert_exactly("shadow of an unlit sheet", &floor_under(&[white.clone()], 0.0), 0.0);
+    assert_exactly("shadow of an unlit sheet", &floor_under(std::slice::from_ref(&white), 0.0), 0.0);
     // Emission of an unlit material is not light either.
     let shining = Material { emission: Param::constant([100.0; 3]), ..white };
     assert_exactly("shadow of an unlit lamp", &floor_under(&[shining], 0.0), 0.0);
