@@ -11,6 +11,7 @@ use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::table::MaterialTable;
+use crate::math::MAX_UV_SETS;
 use crate::scene::{Instance, MAX_COORDINATE, Scene};
 use crate::shape::Mesh;
 use crate::shape::table::{Corners, NONE, TriangleTable};
@@ -235,9 +236,13 @@ fn flatten(
 
 /// Attributes of a triangle's corners.
 fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 3]>, table: &mut TriangleTable) -> u32 {
-    let uvs = mesh.uv_sets.iter().map(|set| corners.map(|v| set[v as usize])).collect();
+    let mut uvs = [[[0.0; 2]; 3]; MAX_UV_SETS];
+    let sets = mesh.uv_sets.len();
+    for (uv, set) in uvs.iter_mut().zip(&mesh.uv_sets) {
+        *uv = corners.map(|v| set[v as usize]);
+    }
     let colors = mesh.colors.as_ref().map(|c| corners.map(|v| c[v as usize]));
-    table.push_attributes(&Corners { normals, uvs, colors })
+    table.push_attributes(&Corners { normals, uvs: &uvs[..sets], colors })
 }
 
 /// `m` over its largest element: directions stay, and products of three elements stay in range whatever the scale.

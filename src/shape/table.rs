@@ -15,11 +15,11 @@ const MORE_UV_SETS_SHIFT: u32 = 2;
 
 /// Attributes of a triangle's corners, as they are put into the table.
 #[derive(Clone, Debug, Default)]
-pub struct Corners {
+pub struct Corners<'a> {
     /// Shading normals; without them shading is flat.
     pub normals: Option<[glam::Vec3; 3]>,
     /// Texture coordinates: sets of three, at most [`MAX_UV_SETS`].
-    pub uvs: Vec<[[f32; 2]; 3]>,
+    pub uvs: &'a [[[f32; 2]; 3]],
     /// Linear R G B and opacity.
     pub colors: Option<[[f32; 4]; 3]>,
 }
@@ -102,7 +102,7 @@ impl TriangleTable {
     }
 
     /// Adds corner attributes and gives their index.
-    pub fn push_attributes(&mut self, corners: &Corners) -> u32 {
+    pub fn push_attributes(&mut self, corners: &Corners<'_>) -> u32 {
         let Corners { normals, uvs, colors } = corners;
         let index = self.attributes.len() as u32;
         let more = uvs.len().saturating_sub(1);
