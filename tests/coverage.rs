@@ -247,6 +247,17 @@ fn culled_backs_let_camera_rays_pass_and_still_cast_shadows() {
 }
 
 #[test]
+fn culled_backs_stop_light_that_scatters() {
+    // A lamp above a single-sided sheet whose back faces the floor: gone for the camera below, there for all light.
+    let mut scene =
+        floor_under_lamp(scenes::lamp(0.0, 5.0), &[Material { double_sided: false, ..scenes::lambert(0.0) }]);
+    // The lamp shines down.
+    scene.meshes[1].indices = vec![[0, 2, 1], [0, 3, 2]];
+    let settings = RenderSettings { cull_backfaces: true, ..settings(8, 64, 0) };
+    assert!(shoot(&scene, &settings).pixels.iter().flatten().all(|&x| x == 0.0));
+}
+
+#[test]
 fn alpha_of_an_opaque_material_is_ignored() {
     assert_exactly("opaque", &floor_under(&[black(AlphaMode::Opaque, 0.0)], 0.0), 0.0);
 }
