@@ -44,7 +44,9 @@ pub(super) fn find(folders: &Folders, folder: &str, name: &str) -> Result<Found,
                 Ok(path) if path.is_file() => return Ok(Found { path, warning: None }),
                 Ok(_) => why = "is not a file".into(),
                 // The first place is the one that the file means.
-                Err(refused) if why.is_empty() => why = format!("{} {}", refused.problem, refused.fix),
+                Err(refused) if why.is_empty() => {
+                    why = format!("{} ({})", refused.problem, refused.fix.trim_end_matches('.'))
+                }
                 Err(_) => {}
             }
         }
