@@ -1,6 +1,8 @@
 //! Which files an input may name: those below its own folder or `--asset-root`, links followed.
 
 use crate::error::{LoadError, SourceLoc};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 /// The folders of one input.
@@ -78,11 +80,20 @@ impl Folders {
     }
 }
 
-/// The bytes of a regular file; anything else (a folder, a pipe that would block) is an error.
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+/// Opens a regular file (anything else, a folder or a pipe that would block, is an error) and tells its length.
+pub(super) fn open_file(path: &Path) -> Result<(File, u64), String> {
     let meta = std::fs::metadata(path).map_err(|e| e.to_string())?;
     if !meta.is_file() {
         return Err("not a regular file".into());
     }
-    std::fs::read(path).map_err(|e| e.to_string())
+    let file = File::open(path).map_err(|e| e.to_string())?;
+    Ok((file, meta.len()))
+}
+
+/// The bytes of a regular file.
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+    let (mut file, length) = open_file(path)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(length).map_err(|e| e.to_string())?);
+    file.read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    Ok(bytes)
 }

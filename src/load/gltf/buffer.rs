@@ -3,9 +3,9 @@
 //! signal.
 
 use super::Result;
-use super::container::open_file;
 use super::document::Document;
 use super::uri::Source;
+use crate::load::folders::open_file;
 use gltf::json::Index;
 use gltf::json::buffer::{Buffer, View};
 use gltf::json::validation::USize64;

@@ -3,7 +3,7 @@
 
 use super::{LoadError, Result};
 use crate::error::SourceLoc;
-use std::fs::File;
+use crate::load::folders::open_file;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::Path;
@@ -22,24 +22,6 @@ pub(super) struct Container {
     pub bin: Option<Range<u64>>,
     /// About the container.
     pub warnings: Vec<String>,
-}
-
-/// Opens a regular file (anything else, a folder or a pipe that would block, is an error) and tells its length.
-pub(super) fn open_file(path: &Path) -> std::result::Result<(File, u64), String> {
-    let meta = std::fs::metadata(path).map_err(|e| e.to_string())?;
-    if !meta.is_file() {
-        return Err("not a regular file".into());
-    }
-    let file = File::open(path).map_err(|e| e.to_string())?;
-    Ok((file, meta.len()))
-}
-
-/// The bytes of a regular file.
-pub(super) fn read_file(path: &Path) -> std::result::Result<Vec<u8>, String> {
-    let (mut file, length) = open_file(path)?;
-    let mut bytes = Vec::with_capacity(usize::try_from(length).map_err(|e| e.to_string())?);
-    file.read_to_end(&mut bytes).map_err(|e| e.to_string())?;
-    Ok(bytes)
 }
 
 /// Reads the JSON of `path` and finds its BIN chunk.

@@ -1,10 +1,10 @@
 //! Images: bytes from a buffer view, a data URI or a file; decoded in parallel, each once.
 
-use super::container::read_file;
 use super::document::Document;
 use super::uri::Source;
 use super::{Loader, Result, name_or};
 use crate::image::decode::{self, Format, Pixels};
+use crate::load::folders::read_file;
 use crate::texture::{Channels, Image, Texels};
 use rayon::prelude::*;
 use std::borrow::Cow;
