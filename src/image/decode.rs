@@ -84,14 +84,38 @@ pub struct DecodeError {
 /// # Errors
 /// Another format, too large, cut short or damaged.
 pub fn rgba(bytes: &[u8]) -> Result<(Decoded, Format), DecodeError> {
+    let (format, kind) = sniff(bytes)?;
+    let most = match format {
+        // One bit a pixel is the least that a PNG can mean.
+        Format::Png => 8 * MAX_DEFLATE_RATIO * bytes.len() as u64 + 7,
+        Format::Jpeg | Format::WebP => u64::MAX,
+    };
+    Ok((decode(bytes, kind, &format, most)?, format))
+}
+
+/// The pixels of a picture of a known kind, called `format` in messages; `bytes` can hold at most `most` of them.
+///
+/// # Errors
+/// See [`rgba`].
+pub(super) fn decode(
+    bytes: &[u8],
+    kind: ImageFormat,
+    format: &dyn fmt::Display,
+    most: u64,
+) -> Result<Decoded, DecodeError> {
     // The decoders are not ours. A panic in one, a bug there, costs this picture and not the whole batch.
-    catch_unwind(AssertUnwindSafe(|| decode(bytes))).unwrap_or_else(|_| {
+    catch_unwind(AssertUnwindSafe(|| decode_unguarded(bytes, kind, format, most))).unwrap_or_else(|_| {
         Err(DecodeError { problem: "the decoder failed on this image".into(), fix: "Save the image again." })
     })
 }
 
-fn decode(bytes: &[u8]) -> Result<(Decoded, Format), DecodeError> {
-    let (format, kind) = sniff(bytes)?;
+/// [`decode`], where a decoder may panic.
+pub(super) fn decode_unguarded(
+    bytes: &[u8],
+    kind: ImageFormat,
+    format: &dyn fmt::Display,
+    most: u64,
+) -> Result<Decoded, DecodeError> {
     let damaged = |e: image::ImageError| DecodeError {
         problem: format!("the {format} cannot be decoded: {e}"),
         fix: "Save the image again.",
@@ -111,10 +135,9 @@ fn decode(bytes: &[u8]) -> Result<(Decoded, Format), DecodeError> {
             fix: "Allowed are 1 to 32768 along each side and 2^28 in all.",
         });
     }
-    // One bit a pixel is the least that a PNG can mean.
-    if format == Format::Png && count / 8 > MAX_DEFLATE_RATIO * bytes.len() as u64 {
+    if count > most {
         return Err(DecodeError {
-            problem: format!("{width} x {height} pixels cannot be in {} bytes of PNG", bytes.len()),
+            problem: format!("{width} x {height} pixels cannot be in {} bytes of {format}", bytes.len()),
             fix: "The image is cut short or made to exhaust memory.",
         });
     }
@@ -129,7 +152,7 @@ fn decode(bytes: &[u8]) -> Result<(Decoded, Format), DecodeError> {
         problem: format!("pixels of the kind {color:?}"),
         fix: "Save the image with 8 or 16 bits a channel.",
     })?;
-    Ok((Decoded { width, height, pixels }, format))
+    Ok(Decoded { width, height, pixels })
 }
 
 /// R G B A from what the decoders give; `None` for floats, which none of ours gives.
