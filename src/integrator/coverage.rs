@@ -93,18 +93,6 @@ fn step<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, active: 
     let start = behind(&triangle, triangle.point(u, v), d);
     // Towards the same end point, which lies at t = 1; a distant light has none.
     let d = (origin + d - start).or_else(t_max.is_finite(), d);
-    let to = pool.n_shadow;
-    start.x.compress(passes, &mut pool.shadow.ox, to);
-    start.y.compress(passes, &mut pool.shadow.oy, to);
-    start.z.compress(passes, &mut pool.shadow.oz, to);
-    d.x.compress(passes, &mut pool.shadow.dx, to);
-    d.y.compress(passes, &mut pool.shadow.dy, to);
-    d.z.compress(passes, &mut pool.shadow.dz, to);
-    t_max.compress(passes, &mut pool.shadow.t_max, to);
-    key.compress(passes, &mut pool.shadow_key, to);
-    slot.compress(passes, &mut pool.shadow_slot, to);
-    radiance.x.compress(passes, &mut pool.shadow_radiance[0], to);
-    radiance.y.compress(passes, &mut pool.shadow_radiance[1], to);
-    radiance.z.compress(passes, &mut pool.shadow_radiance[2], to);
-    pool.n_shadow += passes.count();
+    key.compress(passes, &mut pool.shadow_key, pool.n_shadow);
+    pool.push_shadow::<L>(passes, (start, d, t_max), slot, radiance);
 }

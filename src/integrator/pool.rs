@@ -1,7 +1,8 @@
 //! The state of a worker's paths, structure of arrays, small enough for the L2 cache.
 
 use crate::accel::{HitBatch, RayBatch};
-use simd::Buffer;
+use crate::math::V3;
+use simd::{Buffer, Float, Lanes, Mask, Uint};
 
 /// Paths in flight per worker. 1024 to 4096 measured equal; more no longer fits in L2.
 pub const POOL: usize = 2048;
@@ -90,6 +91,31 @@ impl PathPool {
             shadow_hits: HitBatch::new(room),
             occluded: vec![0; room],
         }
+    }
+
+    /// Appends shadow rays of the lanes `keep`, packed: where they start, their direction and end (in units of it), whom
+    /// they light and with what.
+    #[inline(always)]
+    pub fn push_shadow<L: Lanes>(
+        &mut self,
+        keep: L::M,
+        (origin, direction, t_max): (V3<L>, V3<L>, L::F),
+        slot: L::U,
+        radiance: V3<L>,
+    ) {
+        let to = self.n_shadow;
+        origin.x.compress(keep, &mut self.shadow.ox, to);
+        origin.y.compress(keep, &mut self.shadow.oy, to);
+        origin.z.compress(keep, &mut self.shadow.oz, to);
+        direction.x.compress(keep, &mut self.shadow.dx, to);
+        direction.y.compress(keep, &mut self.shadow.dy, to);
+        direction.z.compress(keep, &mut self.shadow.dz, to);
+        t_max.compress(keep, &mut self.shadow.t_max, to);
+        slot.compress(keep, &mut self.shadow_slot, to);
+        radiance.x.compress(keep, &mut self.shadow_radiance[0], to);
+        radiance.y.compress(keep, &mut self.shadow_radiance[1], to);
+        radiance.z.compress(keep, &mut self.shadow_radiance[2], to);
+        self.n_shadow += keep.count();
     }
 
     /// Adds to the radiance of a slot.

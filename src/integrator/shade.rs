@@ -227,19 +227,7 @@ fn queue_light_sample<L: Lanes>(
     let cast = sees & !broken & arriving.max_component().gt(zero);
     let direction = light.wi.or_else(light.is_distant, light.end - start);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
-    let to = pool.n_shadow;
-    start.x.compress(cast, &mut pool.shadow.ox, to);
-    start.y.compress(cast, &mut pool.shadow.oy, to);
-    start.z.compress(cast, &mut pool.shadow.oz, to);
-    direction.x.compress(cast, &mut pool.shadow.dx, to);
-    direction.y.compress(cast, &mut pool.shadow.dy, to);
-    direction.z.compress(cast, &mut pool.shadow.dz, to);
-    t_max.compress(cast, &mut pool.shadow.t_max, to);
-    slot.compress(cast, &mut pool.shadow_slot, to);
-    arriving.x.compress(cast, &mut pool.shadow_radiance[0], to);
-    arriving.y.compress(cast, &mut pool.shadow_radiance[1], to);
-    arriving.z.compress(cast, &mut pool.shadow_radiance[2], to);
-    pool.n_shadow += cast.count();
+    pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);
     cast
 }
 
