@@ -28,33 +28,23 @@ fn texels(scene: &Scene, read: TextureRef) -> &Texels {
 
 /// Mean of R, G, B, decoded from sRGB.
 fn mean_color(texels: &Texels) -> [f64; 3] {
-    let n = texels.len().max(1) as f64;
     match texels {
-        Texels::Rgba8(texels) => {
-            // 256 curves instead of one a texel.
-            let mut counts = [[0_u64; 256]; 3];
-            for texel in texels {
-                for (count, &value) in counts.iter_mut().zip(texel) {
-                    count[usize::from(value)] += 1;
-                }
-            }
-            let value = |byte: usize| linear_from_srgb(byte as f64 / 255.0);
-            counts.map(|c| c.iter().enumerate().map(|(byte, &k)| value(byte) * k as f64).sum::<f64>() / n)
-        }
-        Texels::Rgba16(texels) => {
-            let value = |v: u16| linear_from_srgb(f64::from(v) / 65535.0);
-            [0, 1, 2].map(|c| texels.iter().map(|t| value(t[c])).sum::<f64>() / n)
-        }
-        Texels::Few8(_) | Texels::Few16(_) => {
-            let mut sums = [0.0; 3];
-            for i in 0..texels.len() {
-                for (sum, value) in sums.iter_mut().zip(texels.get(i)) {
-                    *sum += linear_from_srgb(f64::from(value));
-                }
-            }
-            sums.map(|sum| sum / n)
-        }
+        Texels::Rgba8(texels) => [0, 1, 2].map(|c| mean(texels.iter().map(|t| t[c]))),
+        Texels::Rgba16(texels) => [0, 1, 2].map(|c| mean(texels.iter().map(|t| t[c]))),
+        Texels::Few8(few) => [0, 1, 2].map(|c| mean(few.channel(c))),
+        Texels::Few16(few) => [0, 1, 2].map(|c| mean(few.channel(c))),
     }
+}
+
+/// Mean of integers of 8 or 16 bits that are sRGB, decoded: a curve for each value that there is, not one a texel.
+fn mean<T: Copy + Into<u32>>(values: impl Iterator<Item = T>) -> f64 {
+    let mut counts = vec![0_u64; 1 << (8 * size_of::<T>())];
+    for value in values {
+        counts[value.into() as usize] += 1;
+    }
+    let (n, last) = (counts.iter().sum::<u64>().max(1) as f64, (counts.len() - 1) as f64);
+    let decoded = |value: usize| linear_from_srgb(value as f64 / last);
+    counts.iter().enumerate().filter(|(_, k)| **k > 0).map(|(v, &k)| decoded(v) * k as f64).sum::<f64>() / n
 }
 
 /// Mean share of the surface that is there; vertex colours are left out.
@@ -79,7 +69,7 @@ fn coverage(scene: &Scene, material: &Material) -> f64 {
 mod tests {
     use super::*;
     use crate::scene::{ImageId, TextureId};
-    use crate::texture::{Filter, Image, Param, Texture, Wrap};
+    use crate::texture::{Channels, Filter, Image, Param, Texture, Wrap};
 
     fn scene(texels: Texels) -> Scene {
         let image = Image { width: texels.len() as u32, height: 1, texels, name: String::new() };
@@ -96,7 +86,9 @@ mod tests {
     #[test]
     fn a_texture_counts_by_its_mean_decoded_to_linear() {
         // sRGB 188 is linear 0.5029 (IEC 61966-2-1), so half white, half of it is 0.7514.
-        for texels in [Texels::Rgba8(vec![[188; 4], [255; 4]]), Texels::Rgba16(vec![[188 * 257; 4], [65535; 4]])] {
+        let whole = [Texels::Rgba8(vec![[188; 4], [255; 4]]), Texels::Rgba16(vec![[188 * 257; 4], [65535; 4]])];
+        let narrow = whole.clone().map(|texels| texels.narrowed(Channels::RGB));
+        for texels in whole.into_iter().chain(narrow) {
             let mean = mean_emission(&scene(texels), &glowing());
             assert!((mean[0] - 2.0 * 0.75144).abs() < 2e-4 && (mean[1] - 0.75144).abs() < 1e-4, "{mean:?}");
             assert_eq!(mean[2], 0.0);

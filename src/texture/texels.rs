@@ -131,6 +131,11 @@ impl<T: Copy + PartialEq> Few<T> {
         Some(Self { values, kept: kept.len(), at })
     }
 
+    /// What channel `c` (0 = R, 3 = A) reads of each pixel in turn.
+    pub fn channel(&self, c: usize) -> impl Iterator<Item = T> {
+        self.values.iter().skip(usize::from(self.at[c])).step_by(self.kept).copied()
+    }
+
     fn len(&self) -> usize {
         self.values.len() / self.kept
     }
