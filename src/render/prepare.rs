@@ -175,6 +175,11 @@ fn flatten(
         let p = instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
         (p - origin).as_vec3().to_array()
     }));
+    // Once a vertex, not once a corner: a vertex is in six triangles on average.
+    let vertex_normals: Option<Vec<glam::Vec3>> = mesh.normals.as_ref().map(|normals| {
+        let world = |&n: &[f32; 3]| (normal_from_object * glam::Vec3::from(n).as_dvec3()).normalize_or_zero().as_vec3();
+        normals.iter().map(world).collect()
+    });
     let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
     // Mean over channels: what its share of the light samples follows.
     let average = emission.iter().sum::<f64>() / 3.0;
@@ -200,12 +205,7 @@ fn flatten(
         mesh_area += area;
         // + 0 turns -0 into 0, here and below: the frame about a normal depends on the sign.
         let ng = (cross / (2.0 * area)).as_vec3() + glam::Vec3::ZERO;
-        let mut normals = mesh.normals.as_ref().map(|n| {
-            [i, j, k].map(|v| {
-                let n = glam::Vec3::from(n[v as usize]).as_dvec3();
-                (normal_from_object * n).normalize_or_zero().as_vec3()
-            })
-        });
+        let mut normals = vertex_normals.as_ref().map(|n| [i, j, k].map(|v| n[v as usize]));
         // As pbrt does: normals against the winding would light the triangle from behind.
         let turns = normals.is_some_and(|n| n.iter().all(|n| n.dot(ng) < 0.0));
         if turns {
