@@ -3,6 +3,8 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+pub mod content;
+pub mod fingerprint;
 pub mod input;
 pub mod job;
 pub mod names;
@@ -12,6 +14,7 @@ mod picture;
 pub mod report;
 mod run;
 mod size;
+pub mod up_to_date;
 mod view;
 
 pub use picture::FileOptions;
