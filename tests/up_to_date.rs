@@ -6,12 +6,15 @@ mod obj_support;
 use gltf_support::{Sample, png};
 use prt::batch::content::{HashCache, hash_sources};
 use prt::batch::fingerprint::{CameraOrigin, Fingerprint, Wanted};
+use prt::batch::job::CameraChoice;
+use prt::batch::names::NameTemplate;
+use prt::batch::report::{self, ImageReport, Status};
 use prt::batch::up_to_date::{Why, check};
-use prt::batch::{CameraSource, FileOptions, PictureSize, View};
+use prt::batch::{CameraSource, FileSettings, PictureSize, View};
 use prt::color::{ToneCurve, ToneMap};
 use prt::image::exr::ExrCompression;
 use prt::load::{LoadOptions, load, obj::ObjUp};
-use prt::render::{AccelChoice, CropWindow, DefaultLight, Filter, RenderSettings};
+use prt::render::{AccelChoice, CropWindow, DefaultLight, Filter};
 use prt::scene::Scene;
 use serde_json::{Value, json};
 use std::fs;
@@ -23,12 +26,9 @@ use tempfile::TempDir;
 struct Shot {
     dir: TempDir,
     input: &'static str,
-    size: PictureSize,
     origin: CameraOrigin,
     camera: usize,
-    load: LoadOptions,
-    render: RenderSettings,
-    files: FileOptions,
+    settings: FileSettings,
 }
 
 impl Shot {
@@ -40,12 +40,9 @@ impl Shot {
         Self {
             dir,
             input,
-            size: PictureSize::Width(64),
             origin: CameraOrigin::Input,
             camera: 0,
-            load: LoadOptions::default(),
-            render: RenderSettings::default(),
-            files: FileOptions::default(),
+            settings: FileSettings { size: PictureSize::Width(64), ..FileSettings::default() },
         }
     }
 
@@ -79,18 +76,15 @@ impl Shot {
     }
 
     fn scene(&self) -> Scene {
-        load(&self.path(self.input), &self.load).unwrap().0
+        load(&self.path(self.input), &self.settings.load).unwrap().0
     }
 
     fn with_wanted<T>(&self, take: impl FnOnce(&Wanted) -> T) -> T {
         take(&Wanted {
             input: &self.path(self.input),
-            size: self.size,
+            settings: &self.settings,
             origin: &self.origin,
             camera: self.camera,
-            load: &self.load,
-            render: &self.render,
-            files: &self.files,
         })
     }
 
@@ -103,14 +97,16 @@ impl Shot {
     /// Writes files as a run would.
     fn render(&self) -> Fingerprint {
         let mut fingerprint = self.fingerprint();
-        for (kind, is_wanted) in [("exr", self.files.exr), ("png", self.files.png)] {
+        for (kind, is_wanted) in [("exr", self.settings.files.exr), ("png", self.settings.files.png)] {
             if is_wanted {
                 let bytes = format!("the {kind} of {}", fingerprint.pixels).into_bytes();
                 fs::write(self.out(kind), &bytes).unwrap();
                 fingerprint.add_output(kind, &bytes);
             }
         }
-        self.write_json(&json!({"status": "rendered", "spp": 64, "fingerprint": fingerprint}));
+        let report =
+            ImageReport { status: Status::Rendered, fingerprint: Some(fingerprint.clone()), ..ImageReport::default() };
+        fs::write(self.out("json"), report::to_json(&report)).unwrap();
         fingerprint
     }
 
@@ -239,20 +235,20 @@ type Edit = fn(&mut Shot);
 
 /// What matters of both formats, by the option that is named then.
 const MATTERS: [(&str, Edit); 17] = [
-    ("size 64 wide -> 65 wide", |s| s.size = PictureSize::Width(65)),
-    ("size 64 wide -> 64x36", |s| s.size = PictureSize::Exact(64, 36)),
+    ("size 64 wide -> 65 wide", |s| s.settings.size = PictureSize::Width(65)),
+    ("size 64 wide -> 64x36", |s| s.settings.size = PictureSize::Exact(64, 36)),
     ("camera 0 -> 1", |s| s.camera = 1),
-    ("crop whole -> 1,2,3,4", |s| s.render.crop = Some(CropWindow { x: 1, y: 2, width: 3, height: 4 })),
-    ("spp 64 -> 128", |s| s.render.spp = 128),
-    ("seed 0 -> 18446744073709551615", |s| s.render.seed = u64::MAX),
-    ("frame 0 -> 1", |s| s.render.frame = 1),
-    ("max-bounces unlimited -> 0", |s| s.render.max_bounces = Some(0)),
-    ("cull-backfaces off -> on", |s| s.render.cull_backfaces = true),
-    ("filter tent:2 -> box:2", |s| s.render.filter = Filter::Box { width: 2.0 }),
-    ("filter tent:2 -> tent:2.0000002", |s| s.render.filter = Filter::Tent { width: 2.0_f32.next_up() }),
-    ("default-light auto -> off", |s| s.render.default_light = DefaultLight::Off),
-    ("accel auto -> bvh", |s| s.render.accel = AccelChoice::Bvh),
-    ("scene default -> 0", |s| s.load.scene = Some("0".into())),
+    ("crop whole -> 1,2,3,4", |s| s.settings.render.crop = Some(CropWindow { x: 1, y: 2, width: 3, height: 4 })),
+    ("spp 64 -> 128", |s| s.settings.render.spp = 128),
+    ("seed 0 -> 18446744073709551615", |s| s.settings.render.seed = u64::MAX),
+    ("frame 0 -> 1", |s| s.settings.render.frame = 1),
+    ("max-bounces unlimited -> 0", |s| s.settings.render.max_bounces = Some(0)),
+    ("cull-backfaces off -> on", |s| s.settings.render.cull_backfaces = true),
+    ("filter tent:2 -> box:2", |s| s.settings.render.filter = Filter::Box { width: 2.0 }),
+    ("filter tent:2 -> tent:2.0000002", |s| s.settings.render.filter = Filter::Tent { width: 2.0_f32.next_up() }),
+    ("default-light auto -> off", |s| s.settings.render.default_light = DefaultLight::Off),
+    ("accel auto -> bvh", |s| s.settings.render.accel = AccelChoice::Bvh),
+    ("scene default -> 0", |s| s.settings.load.scene = Some("0".into())),
     ("eye none -> 0,0,5", |s| s.origin = CameraOrigin::View(VIEW)),
     ("camera-from none -> ", |s| s.origin = camera_file(s, b"one")),
     ("yfov none -> 40", |s| s.origin = CameraOrigin::View(VIEW)),
@@ -260,21 +256,23 @@ const MATTERS: [(&str, Edit); 17] = [
 
 /// Of OBJ alone.
 const MATTERS_TO_OBJ: [(&str, Edit); 3] = [
-    ("obj-up y -> z", |s| s.load.obj_up = ObjUp::Z),
-    ("obj-scale 1 -> 0.01", |s| s.load.obj_scale = Some(0.01)),
-    ("smooth-angle off -> 30", |s| s.load.smooth_angle = Some(30.0)),
+    ("obj-up y -> z", |s| s.settings.load.obj_up = ObjUp::Z),
+    ("obj-scale 1 -> 0.01", |s| s.settings.load.obj_scale = Some(0.01)),
+    ("smooth-angle off -> 30", |s| s.settings.load.smooth_angle = Some(30.0)),
 ];
 
 /// What does not change a pixel.
-const DOES_NOT: [Edit; 8] = [
-    |s| s.render.threads = Some(7),
-    |s| s.render.lanes = Some(1),
-    |s| s.render.embree_dirs = vec!["elsewhere".into()],
-    |s| (s.render.width, s.render.height) = (1, 1),
-    |s| s.load.asset_root = Some(s.dir.path().to_owned()),
-    |s| s.load.obj_scale = s.load.obj_scale.or(s.input.ends_with("obj").then_some(1.0)),
-    |s| s.files.png = false,
-    |s| (s.files.png, s.files.exr) = (false, false),
+const DOES_NOT: [Edit; 10] = [
+    |s| s.settings.name = Some(NameTemplate::parse("{stem}-x").unwrap()),
+    |s| s.settings.cameras = CameraChoice::Index(0),
+    |s| s.settings.render.threads = Some(7),
+    |s| s.settings.render.lanes = Some(1),
+    |s| s.settings.render.embree_dirs = vec!["elsewhere".into()],
+    |s| (s.settings.render.width, s.settings.render.height) = (1, 1),
+    |s| s.settings.load.asset_root = Some(s.dir.path().to_owned()),
+    |s| s.settings.load.obj_scale = s.settings.load.obj_scale.or(s.input.ends_with("obj").then_some(1.0)),
+    |s| s.settings.files.png = false,
+    |s| (s.settings.files.png, s.settings.files.exr) = (false, false),
 ];
 
 const VIEW: View =
@@ -297,7 +295,7 @@ fn every_setting_that_matters_changes_the_fingerprint_and_is_named() {
         let before = shot.fingerprint();
         let of_obj = if shot.input == "m.obj" { &MATTERS_TO_OBJ[..] } else { &[] };
         for (says, edit) in MATTERS.iter().chain(of_obj) {
-            let (size, load, render) = (shot.size, shot.load.clone(), shot.render.clone());
+            let settings = shot.settings.clone();
             edit(&mut shot);
             let after = shot.fingerprint();
             assert!(after.pixels != before.pixels && after.files != before.files, "{says}");
@@ -306,8 +304,7 @@ fn every_setting_that_matters_changes_the_fingerprint_and_is_named() {
             assert_ne!(after.settings.get(key), before.settings.get(key));
             let expected = if key == "yfov" { "eye none" } else { says };
             assert!(shot.why().starts_with(&format!("settings changed: {expected}")), "{says}: {}", shot.why());
-            (shot.size, shot.load, shot.render) = (size, load, render);
-            (shot.camera, shot.origin) = (0, CameraOrigin::Input);
+            (shot.settings, shot.camera, shot.origin) = (settings, 0, CameraOrigin::Input);
         }
         shot.check().expect("as it was");
     }
@@ -335,9 +332,11 @@ fn what_changes_no_pixel_keeps_the_files() {
 #[test]
 fn how_files_are_made_of_pixels_changes_their_hash_alone() {
     let edits: [(&str, Edit); 3] = [
-        ("exposure 0 -> 1.5", |s| s.files.tone = ToneMap { exposure: 1.5, ..s.files.tone }),
-        ("tonemap neutral -> srgb", |s| s.files.tone = ToneMap { curve: ToneCurve::Srgb, ..s.files.tone }),
-        ("exr-compression zip -> piz", |s| s.files.compression = ExrCompression::Piz),
+        ("exposure 0 -> 1.5", |s| s.settings.files.tone = ToneMap { exposure: 1.5, ..s.settings.files.tone }),
+        ("tonemap neutral -> srgb", |s| {
+            s.settings.files.tone = ToneMap { curve: ToneCurve::Srgb, ..s.settings.files.tone }
+        }),
+        ("exr-compression zip -> piz", |s| s.settings.files.compression = ExrCompression::Piz),
     ];
     for (says, edit) in edits {
         let mut shot = Shot::gltf().rendered();
@@ -350,11 +349,11 @@ fn how_files_are_made_of_pixels_changes_their_hash_alone() {
     }
     // The curve is nothing to a run without a PNG.
     let mut shot = Shot::gltf();
-    shot.files.png = false;
+    shot.settings.files.png = false;
     let mut shot = shot.rendered();
-    shot.files.tone.exposure = 1.0;
+    shot.settings.files.tone.exposure = 1.0;
     shot.check().expect("is up to date");
-    shot.files.png = true;
+    shot.settings.files.png = true;
     assert_eq!(shot.why(), "no png was asked for the last time");
 }
 
@@ -386,7 +385,7 @@ fn outputs_that_are_not_whole_are_found() {
             damage(&shot.out(kind));
             assert_eq!(shot.why(), format!("{} {says}", shot.out(kind).display()));
             // One that is not asked for is not looked at.
-            (shot.files.exr, shot.files.png) = (kind != "exr", kind != "png");
+            (shot.settings.files.exr, shot.settings.files.png) = (kind != "exr", kind != "png");
             shot.check().expect("is up to date");
         }
     }
@@ -469,12 +468,12 @@ fn an_asset_root_that_lets_a_file_in_which_was_refused_means_rendering() {
     fs::write(shot.dir.path().join("out.png"), png(&[9; 4], 1, 1)).unwrap();
     let narrow = shot.render();
     shot.check().expect("it is refused again");
-    shot.load.asset_root = Some(shot.dir.path().to_owned());
+    shot.settings.load.asset_root = Some(shot.dir.path().to_owned());
     assert_eq!(shot.why(), "../out.png was not there before");
     let wide = shot.render();
     assert_ne!(wide.pixels, narrow.pixels);
     shot.check().expect("is up to date");
-    shot.load.asset_root = None;
+    shot.settings.load.asset_root = None;
     assert_eq!(shot.why(), "../out.png is missing");
 }
 

@@ -6,6 +6,7 @@
 
 use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
 use super::picture::FileOptions;
+use super::settings::FileSettings;
 use super::size::PictureSize;
 use super::view::{CameraSource, View};
 use crate::camera::Camera;
@@ -54,18 +55,12 @@ pub struct OutputRecord {
 pub struct Wanted<'a> {
     /// The scene file.
     pub input: &'a Path,
-    /// Size of the picture.
-    pub size: PictureSize,
-    /// Whose cameras.
+    /// How it is made.
+    pub settings: &'a FileSettings,
+    /// Whose cameras, as `settings.camera_source` has it.
     pub origin: &'a CameraOrigin,
     /// Which of them, by its place.
     pub camera: usize,
-    /// How the input is read.
-    pub load: &'a LoadOptions,
-    /// Everything else about the picture; width and height are not looked at.
-    pub render: &'a RenderSettings,
-    /// Which files, and how.
-    pub files: &'a FileOptions,
 }
 
 /// Where cameras come from, as far as pixels depend on it.
@@ -109,7 +104,7 @@ impl CameraOrigin {
 impl Fingerprint {
     /// Of the image `wanted`, made from `inputs`; outputs are added as they are written.
     pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>) -> Self {
-        let (pixel_settings, file_settings) = (wanted.pixel_settings(), wanted.file_settings());
+        let (pixel_settings, file_settings) = (wanted.pixel_settings(), file_settings(&wanted.settings.files));
         let pixels = hash_pixels(&pixel_settings, &inputs);
         Self {
             prt: crate::VERSION.into(),
@@ -137,9 +132,12 @@ impl Wanted<'_> {
     /// Everything that determines the pixels but the bytes of the inputs. Structures are taken apart whole, so that a
     /// field that is added to one of them must be put here, or named as one that changes no pixel.
     pub fn pixel_settings(&self) -> Settings {
-        let Self { input, size, origin, camera, load, render, files: _ } = *self;
-        let mut settings = Settings::new();
-        let mut set = |key: &str, value: String| _ = settings.insert(key.into(), value);
+        let Self { input, settings, origin, camera } = *self;
+        // Names of files change no pixel; which cameras and from where is said by `origin` and `camera`; `files` comes
+        // after the pixels.
+        let FileSettings { name: _, size, camera_source: _, cameras: _, load, render, files: _ } = settings;
+        let mut lines = Settings::new();
+        let mut set = |key: &str, value: String| _ = lines.insert(key.into(), value);
         set(
             "size",
             match size {
@@ -208,23 +206,23 @@ impl Wanted<'_> {
         set("brdf", name(brdf));
         set("default-light", name(default_light));
         set("accel", name(accel));
-        settings
+        lines
     }
+}
 
-    /// How the files that are asked for are made of the pixels.
-    pub fn file_settings(&self) -> Settings {
-        let FileOptions { exr, png, compression, tone: ToneMap { exposure, curve } } = self.files;
-        let mut settings = Settings::new();
-        if *exr {
-            settings.insert("exr".into(), "float".into());
-            settings.insert("exr-compression".into(), name(compression));
-        }
-        if *png {
-            settings.insert("exposure".into(), exposure.to_string());
-            settings.insert("tonemap".into(), name(curve));
-        }
-        settings
+/// How the files that are asked for are made of the pixels.
+pub fn file_settings(files: &FileOptions) -> Settings {
+    let FileOptions { exr, png, compression, tone: ToneMap { exposure, curve } } = files;
+    let mut lines = Settings::new();
+    if *exr {
+        lines.insert("exr".into(), "float".into());
+        lines.insert("exr-compression".into(), name(compression));
     }
+    if *png {
+        lines.insert("exposure".into(), exposure.to_string());
+        lines.insert("tonemap".into(), name(curve));
+    }
+    lines
 }
 
 /// The name of a variant without fields: only shown, and compared with names made in the same way.

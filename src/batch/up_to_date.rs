@@ -5,12 +5,12 @@
 //! that the image is rendered; it is never an error.
 
 use super::content::{Content, HashCache, InputRecord};
-use super::fingerprint::{Fingerprint, OutputRecord, Settings, Wanted, hash_files, hash_pixels};
+use super::fingerprint::{OutputRecord, Settings, Wanted, file_settings, hash_files, hash_pixels};
 use super::picture::FileOptions;
-use super::report::Status;
-use crate::load::Folders;
+use super::report::{ImageReport, Status};
+use super::settings::FileSettings;
+use crate::load::{Folders, LoadOptions};
 use crate::scene::Stamp;
-use serde::Deserialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -20,8 +20,8 @@ const MOST_BYTES: u64 = 64 << 20;
 /// An image whose files are up to date.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// The JSON, as it is.
-    pub json: Vec<u8>,
+    /// As the run that rendered it wrote it; its paths are those of then.
+    pub report: ImageReport,
     /// The picture files that are asked for, in the order EXR, PNG.
     pub outputs: Vec<PathBuf>,
 }
@@ -124,52 +124,44 @@ impl fmt::Display for Change {
     }
 }
 
-/// What is read of an image's JSON.
-#[derive(Deserialize)]
-struct Record {
-    status: Status,
-    fingerprint: Option<Fingerprint>,
-}
-
 /// Whether the files beside `json`, the JSON of an earlier run, are those that `wanted` would give. Reads the files that
 /// it was made from, and its pictures; not the scene.
 ///
 /// # Errors
 /// They are not.
 pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Why> {
-    let bytes = read(json)?;
     let no_record = |_| Why::NoRecord(json.to_owned());
-    let Record { status, fingerprint } = serde_json::from_slice(&bytes).map_err(no_record)?;
-    if status != Status::Rendered && status != Status::UpToDate {
-        return Err(Why::NotRendered(status));
+    let report: ImageReport = serde_json::from_slice(&read(json)?).map_err(no_record)?;
+    if !matches!(report.status, Status::Rendered | Status::UpToDate) {
+        return Err(Why::NotRendered(report.status));
     }
-    let then = fingerprint.ok_or(Why::NoFingerprint)?;
+    let then = report.fingerprint.as_ref().ok_or(Why::NoFingerprint)?;
     if then.prt != crate::VERSION {
-        return Err(Why::Version { then: then.prt });
+        return Err(Why::Version { then: then.prt.clone() });
     }
     // From cheap to dear: most of what is not up to date is found without reading a file.
-    let wanted_kinds = [("exr", wanted.files.exr), ("png", wanted.files.png)];
+    let FileSettings { files, load, .. } = wanted.settings;
+    let wanted_kinds = [("exr", files.exr), ("png", files.png)];
     let kinds = wanted_kinds.into_iter().filter_map(|(kind, is_wanted)| is_wanted.then_some(kind));
     let not_written = kinds.clone().find(|kind| !then.has_output(kind));
     if let Some(kind) = not_written {
         return Err(Why::NotWritten { kind });
     }
     // Files that are there and not asked for now do no harm.
-    let files = FileOptions { exr: then.has_output("exr"), png: then.has_output("png"), ..*wanted.files };
-    let wanted = Wanted { files: &files, ..*wanted };
-    let (pixel_settings, file_settings) = (wanted.pixel_settings(), wanted.file_settings());
+    let files = FileOptions { exr: then.has_output("exr"), png: then.has_output("png"), ..*files };
+    let (pixel_settings, file_settings) = (wanted.pixel_settings(), file_settings(&files));
     compare(&then.settings, &pixel_settings, &file_settings)?;
     let outputs: Vec<_> = kinds.map(|kind| json.with_extension(kind)).collect();
     let record = |path: &Path| then.outputs.iter().find(|o| path.extension().is_some_and(|e| *e == *o.kind));
     outputs.iter().try_for_each(|path| check_length(path, record(path)))?;
 
-    check_inputs(&then.inputs, &wanted, cache)?;
+    check_inputs(&then.inputs, wanted.input, load, cache)?;
     let pixels = hash_pixels(&pixel_settings, &then.inputs);
     if pixels != then.pixels || hash_files(&pixels, &file_settings) != then.files {
         return Err(Why::Inconsistent(json.to_owned()));
     }
     outputs.iter().try_for_each(|path| check_content(path, record(path)))?;
-    Ok(Kept { json: bytes, outputs })
+    Ok(Kept { report, outputs })
 }
 
 /// The bytes of a JSON that may be anything.
@@ -192,17 +184,17 @@ fn compare(then: &Settings, pixels: &Settings, files: &Settings) -> Result<(), W
 }
 
 /// Whether the files that the image was made from are as they were.
-fn check_inputs(then: &[InputRecord], wanted: &Wanted, cache: &HashCache) -> Result<(), Why> {
-    let itself = || wanted.input.display().to_string();
+fn check_inputs(then: &[InputRecord], input: &Path, load: &LoadOptions, cache: &HashCache) -> Result<(), Why> {
+    let itself = || input.display().to_string();
     let missing = |file: String| Why::Input { file, how: Change::Missing };
-    let folders = Folders::new(wanted.input, wanted.load.asset_root.as_deref()).map_err(|_| missing(itself()))?;
+    let folders = Folders::new(input, load.asset_root.as_deref()).map_err(|_| missing(itself()))?;
     if then.first().is_none_or(|first| !first.name.is_empty()) {
         // What its hash is the hash of is not the input.
         return Err(missing(itself()));
     }
     for record in then {
         let (path, file) = match record.name.as_str() {
-            "" => (Some(wanted.input.to_owned()), itself()),
+            "" => (Some(input.to_owned()), itself()),
             name => (folders.find(name), name.to_owned()),
         };
         let now = path.and_then(|path| cache.content(&path).ok()).map(|(_, content)| content);
