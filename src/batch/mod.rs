@@ -3,6 +3,7 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+mod budget;
 pub mod content;
 mod describe;
 pub mod fingerprint;

@@ -65,6 +65,9 @@ pub struct ImageReport {
     pub losses: Vec<String>,
     /// What it was made from; `None`: that is not known, and it will not be taken for up to date.
     pub fingerprint: Option<Fingerprint>,
+    /// Why it was not taken for up to date; said to the user who asks for details, not part of the JSON.
+    #[serde(skip)]
+    pub why: String,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
