@@ -237,6 +237,7 @@ fn json_has_every_field_of_the_contract() {
         "features",
         "skipped",
         "warnings",
+        "fingerprint",
     ] {
         assert!(image.get(field).is_some(), "{field} in {image}");
     }

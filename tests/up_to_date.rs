@@ -370,7 +370,8 @@ fn the_bytes_of_the_cameras_file_matter_and_not_its_path() {
 
 #[test]
 fn outputs_that_are_not_whole_are_found() {
-    let damage: [(&str, fn(&Path)); 4] = [
+    type Damage = fn(&Path);
+    let damage: [(&str, Damage); 4] = [
         ("is missing", |path| fs::remove_file(path).unwrap()),
         ("is damaged or was edited", |path| fs::write(path, &fs::read(path).unwrap()[1..]).unwrap()),
         ("is damaged or was edited", |path| flip(path, 3)),

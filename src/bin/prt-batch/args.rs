@@ -153,7 +153,7 @@ pub struct RenderArgs {
     /// Worker threads; they do not change a byte of a picture [default: the cores this process may use]
     #[arg(short, long, value_name = "N", value_parser = parse::threads)]
     pub threads: Option<usize>,
-    /// Render even what is up to date (everything renders: keeping it is not built yet)
+    /// Render even what is up to date
     #[arg(long)]
     pub force: bool,
     /// On stderr: auto (a bar on a terminal, else plain), plain (at most one line a second) or none
