@@ -5,29 +5,16 @@ mod emission;
 mod frame;
 mod framing;
 mod prepare;
+mod progress;
 mod schedule;
 mod settings;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
-pub use frame::render;
+pub use frame::{pool, render};
 pub use framing::FRAMING_YFOV;
 pub use prepare::{Prepared, prepare};
+pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
-
-use std::sync::atomic::{AtomicBool, AtomicU64};
-
-/// Watched and steered from another thread while a frame renders.
-#[derive(Debug, Default)]
-pub struct Progress {
-    /// Camera samples finished.
-    pub done: AtomicU64,
-    /// Camera samples to do in all; 0 until known.
-    pub total: AtomicU64,
-    /// Rays traced so far.
-    pub rays: AtomicU64,
-    /// Set it and the render ends soon with [`crate::error::RenderError::Interrupted`].
-    pub cancel: AtomicBool,
-}
 
 /// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
 #[derive(Clone, Copy, Debug)]

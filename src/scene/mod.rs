@@ -38,7 +38,7 @@ pub struct PlacedLight {
 }
 
 /// Something in the file that the picture does not need and that was not read.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Skipped {
     /// JSON pointer without the leading slash, such as `images/3`.
     pub what: String,
