@@ -4,6 +4,8 @@
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
 mod describe;
+mod develop;
+pub mod html;
 pub mod input;
 pub mod job;
 mod load_stage;
@@ -19,6 +21,7 @@ mod size;
 mod view;
 mod write_stage;
 
+pub use develop::{Developed, Tone, develop};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

@@ -59,8 +59,12 @@ mod tests {
     use super::*;
 
     const NEUTRAL: ToneMap = ToneMap { exposure: 0.0, curve: ToneCurve::Neutral };
-    const ALL: [ToneMap; 4] =
-        [NEUTRAL, SRGB, ToneMap { exposure: 0.0, curve: ToneCurve::Agx }, ToneMap { exposure: 0.0, curve: ToneCurve::Aces }];
+    const ALL: [ToneMap; 4] = [
+        NEUTRAL,
+        SRGB,
+        ToneMap { exposure: 0.0, curve: ToneCurve::Agx },
+        ToneMap { exposure: 0.0, curve: ToneCurve::Aces },
+    ];
     const SRGB: ToneMap = ToneMap { exposure: 0.0, curve: ToneCurve::Srgb };
 
     #[test]
