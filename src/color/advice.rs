@@ -9,6 +9,8 @@ pub struct Shades {
     pub pixels: u64,
     /// No channel above [`Shades::BLACK`].
     pub black: u64,
+    /// No channel above [`Shades::DIM`]; the black ones are among them.
+    pub dim: u64,
     /// No channel below [`Shades::WHITE`].
     pub white: u64,
 }
@@ -16,6 +18,8 @@ pub struct Shades {
 impl Shades {
     /// 8-bit sRGB values up to this one look black beside others.
     pub const BLACK: u8 = 2;
+    /// 8-bit sRGB values up to this one (1.4 % of white) are hardly seen in a black picture.
+    pub const DIM: u8 = 32;
     /// 8-bit sRGB values from this one on look white.
     pub const WHITE: u8 = 253;
 
@@ -23,6 +27,7 @@ impl Shades {
     pub fn add(&mut self, color: [u8; 3]) {
         self.pixels += 1;
         self.black += u64::from(color.iter().all(|&c| c <= Self::BLACK));
+        self.dim += u64::from(color.iter().all(|&c| c <= Self::DIM));
         self.white += u64::from(color.iter().all(|&c| c >= Self::WHITE));
     }
 
@@ -31,9 +36,11 @@ impl Shades {
         self.is_black() || self.is_white()
     }
 
-    /// A small lamp in the dark is something to see: one pixel in a thousand.
+    /// A small lamp in the dark is something to see: one pixel in a thousand. A tenth of the picture may glimmer: colours
+    /// outlast greys in the dark, as the neutral curve takes away what the channels have in common.
     fn is_black(&self) -> bool {
-        self.pixels > 0 && (self.pixels - self.black) as f64 <= 0.001 * self.pixels as f64
+        let within = |count: u64, share: f64| (self.pixels - count) as f64 <= share * self.pixels as f64;
+        self.pixels > 0 && within(self.dim, 0.001) && within(self.black, 0.1)
     }
 
     /// White backgrounds are wanted: what stands before one may be as small as a hundredth of the picture.
@@ -151,6 +158,16 @@ mod tests {
         pixels[..5].fill([5.0; 3]);
         assert_eq!(advised(&pixels, 0.0), None);
         assert_eq!(advised(&[], 0.0), None);
+    }
+
+    #[test]
+    fn a_glimmer_here_and_there_is_black_too_but_a_dark_picture_is_not() {
+        let mut pixels = scene(1e-4);
+        // Red of 0.002 of white becomes 7 of 255.
+        pixels[..90].fill([0.002, 0.0, 0.0]);
+        assert!(advised(&pixels, 0.0).unwrap().is_black);
+        pixels[..200].fill([0.002, 0.0, 0.0]);
+        assert_eq!(advised(&pixels, 0.0), None);
     }
 
     #[test]
