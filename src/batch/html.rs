@@ -246,7 +246,8 @@ img { display: block; width: 100%; height: auto; max-height: 30rem; object-fit: 
   border-radius: .3rem .3rem 0 0; background: #808080; }
 pre { margin: .4rem 0; padding: .5rem; white-space: pre-wrap; border: 1px solid var(--line); border-radius: .3rem;
   font-size: .8rem; }
-body:has(#show-bad:checked) article:not(.bad), body:has(#show-warned:checked) article:not(.warned) { display: none; }
+body:has(#show-bad:checked) article:not(.bad, :target),
+body:has(#show-warned:checked) article:not(.warned, :target) { display: none; }
 ";
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ fn rendered(stem: &str) -> ImageReport {
         width: Some(320),
         height: Some(180),
         spp: 64,
-        seconds: Seconds { total: 3.14, ..Seconds::default() },
+        seconds: Seconds { total: 3.12, ..Seconds::default() },
         mrays_per_s: Some(81.6),
         ..ImageReport::default()
     }
@@ -164,7 +164,7 @@ fn a_run_without_images_and_one_of_five_hundred_have_a_page() {
 #[test]
 fn seconds_read_well_at_every_length() {
     for (value, text) in
-        [(0.0123, "12 ms"), (3.14, "3.1 s"), (99.9, "99.9 s"), (119.7, "2 min 00 s"), (3599.6, "1 h 00 min")]
+        [(0.0123, "12 ms"), (3.12, "3.1 s"), (99.9, "99.9 s"), (119.7, "2 min 00 s"), (3599.6, "1 h 00 min")]
     {
         assert_eq!(seconds(value), text);
     }
