@@ -3,8 +3,10 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+pub mod content;
 mod describe;
 mod develop;
+pub mod fingerprint;
 pub mod html;
 pub mod input;
 pub mod job;
@@ -18,6 +20,7 @@ pub mod report;
 mod run;
 mod settings;
 mod size;
+pub mod up_to_date;
 mod view;
 mod write_stage;
 

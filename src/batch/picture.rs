@@ -24,7 +24,8 @@ impl Default for FileOptions {
     }
 }
 
-/// The bytes of the EXR, and how many of its pixels were clipped; `None` where nothing clips.
+/// The bytes of the EXR, and how many of its pixels were clipped; `None` where nothing clips. `fingerprint` is that of
+/// its pixels ([`super::fingerprint::Fingerprint::pixels`]), if known.
 ///
 /// # Errors
 /// See [`exr::encode`].
@@ -32,6 +33,7 @@ pub(super) fn exr_bytes(
     frame: &Frame,
     settings: &RenderSettings,
     options: ExrOptions,
+    fingerprint: Option<&str>,
 ) -> Result<(Vec<u8>, Option<u64>), String> {
     let clipped = match options.samples {
         ExrSamples::Float => None,
@@ -52,14 +54,19 @@ pub(super) fn exr_bytes(
         size: [window.width, window.height],
         pixels: &frame.pixels,
         camera,
-        attributes: attributes(frame, settings, clipped),
+        attributes: attributes(frame, settings, clipped, fingerprint),
     };
     Ok((exr::encode(&picture, options)?, clipped))
 }
 
 /// The `prt:` attributes. Only what determines the pixels, so that equal renders have equal bytes: no times, paths,
 /// host, threads.
-fn attributes(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> Vec<(&'static str, ExrValue)> {
+fn attributes(
+    frame: &Frame,
+    settings: &RenderSettings,
+    clipped: Option<u64>,
+    fingerprint: Option<&str>,
+) -> Vec<(&'static str, ExrValue)> {
     let stats = &frame.stats;
     let mut attributes = vec![
         ("prt:version", ExrValue::Text(crate::VERSION.into())),
@@ -79,6 +86,7 @@ fn attributes(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) ->
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }
+    attributes.extend(fingerprint.map(|hash| ("prt:fingerprint", ExrValue::Text(hash.into()))));
     attributes
 }
 
@@ -137,7 +145,7 @@ mod tests {
     #[test]
     fn files_hold_the_window_of_the_frame() {
         let frame = frame();
-        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), ExrOptions::default()).unwrap();
+        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), ExrOptions::default(), None).unwrap();
         assert_eq!(clipped, None);
         let read = exr_read::decode(&bytes).unwrap();
         assert_eq!((read.origin, read.width, read.height), ([3, 2], 2, 1));
@@ -148,22 +156,27 @@ mod tests {
     fn pixels_that_half_clips_are_counted_and_named() {
         let mut frame = frame();
         let half = ExrOptions { samples: ExrSamples::Half, ..ExrOptions::default() };
-        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), half).unwrap();
+        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), half, None).unwrap();
         assert_eq!(clipped, Some(1));
         assert_eq!(exr_read::decode(&bytes).unwrap().pixels[1][1], 65504.0);
         let named = "1 pixels were clipped at 65504 (--exr half)";
         assert!(bytes.windows(named.len()).any(|window| window == named.as_bytes()));
         frame.pixels[1] = [65504.0, 0.1, -65504.0];
-        assert_eq!(exr_bytes(&frame, &RenderSettings::default(), half).unwrap().1, Some(0));
+        assert_eq!(exr_bytes(&frame, &RenderSettings::default(), half, None).unwrap().1, Some(0));
         assert_eq!(bias_of(&frame, &RenderSettings::default(), Some(0)), "no");
     }
 
     #[test]
     fn attributes_are_those_of_the_contract() {
-        let names: Vec<_> = attributes(&frame(), &RenderSettings::default(), None).iter().map(|a| a.0).collect();
+        let names = |fingerprint| -> Vec<_> {
+            attributes(&frame(), &RenderSettings::default(), None, fingerprint).iter().map(|a| a.0).collect()
+        };
         #[rustfmt::skip]
-        assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
+        assert_eq!(names(None), ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
             "prt:normals", "prt:light", "prt:nonFinite", "prt:truncated", "prt:biased"]);
+        let with_fingerprint = names(Some("0123"));
+        assert_eq!(with_fingerprint[..11], names(None));
+        assert_eq!(with_fingerprint[11..], ["prt:fingerprint"]);
     }
 
     #[test]

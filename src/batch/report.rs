@@ -1,6 +1,7 @@
 //! What happened, as JSON: one document per image and `batch.json` for the run. A field whose feature is not built is
 //! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
 
+use super::fingerprint::Fingerprint;
 use crate::color::Exposure;
 use crate::scene::Skipped;
 use serde::{Deserialize, Serialize};
@@ -65,6 +66,10 @@ pub struct ImageReport {
     pub features: BTreeMap<String, bool>,
     pub skipped: Vec<Skipped>,
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the file is not in the picture: `--strict` fails on them.
+    pub losses: Vec<String>,
+    /// What it was made from; `None`: that is not known, and it will not be taken for up to date.
+    pub fingerprint: Option<Fingerprint>,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
@@ -83,6 +88,7 @@ impl ImageReport {
         if let Some(count) = self.non_finite_samples.filter(|count| *count > 0) {
             failures.push(format!("{count} samples were not finite and were dropped"));
         }
+        failures.extend(self.losses.iter().cloned());
         failures
     }
 }

@@ -1,6 +1,7 @@
 //! Writes the pictures that were rendered, EXR first, the report last: it says what the others hold.
 
 use super::develop::develop;
+use super::fingerprint::Fingerprint;
 use super::output::{WriteError, write_atomic};
 use super::picture::exr_bytes;
 use super::render_stage::fail;
@@ -88,11 +89,12 @@ impl WriteStage {
     ) -> Result<(), WriteError> {
         let files = self.shared.settings.tasks[task].settings.files;
         if files.exr {
-            match self.shared.beside.install(|| exr_bytes(frame, settings, files.format)) {
+            let fingerprint = image.fingerprint.as_ref().map(|f| f.pixels.as_str());
+            match self.shared.beside.install(|| exr_bytes(frame, settings, files.format, fingerprint)) {
                 Ok((bytes, clipped)) => {
                     image.clipped_pixels = clipped;
                     image.warnings.extend(clipped.filter(|clipped| *clipped > 0).map(clipped_warning));
-                    image.outputs.exr = Some(self.file(output, "exr", &bytes)?);
+                    image.outputs.exr = Some(self.file(output, "exr", &bytes, &mut image.fingerprint)?);
                 }
                 Err(error) => {
                     fail(image, format!("{}: {error}", image.input));
@@ -106,16 +108,26 @@ impl WriteStage {
             image.exposure = Some(ExposureReport::new(files.tone.exposure, developed.exposure));
             image.notes.extend(developed.notes);
             image.warnings.extend(developed.warnings);
-            image.outputs.png = Some(self.file(output, "png", &developed.png)?);
+            image.outputs.png = Some(self.file(output, "png", &developed.png, &mut image.fingerprint)?);
         }
         image.status = Status::Rendered;
         Ok(())
     }
 
-    /// Writes `<out>/<output>.<extension>` and tells its path.
-    fn file(&self, output: &Path, extension: &str, bytes: &[u8]) -> Result<String, WriteError> {
+    /// Writes `<out>/<output>.<extension>`, notes it and tells its path.
+    fn file(
+        &self,
+        output: &Path,
+        extension: &str,
+        bytes: &[u8],
+        fingerprint: &mut Option<Fingerprint>,
+    ) -> Result<String, WriteError> {
         let path = self.path(output, extension);
-        write_atomic(&path, bytes).map(|()| path.display().to_string())
+        write_atomic(&path, bytes)?;
+        if let Some(fingerprint) = fingerprint {
+            fingerprint.add_output(extension, bytes);
+        }
+        Ok(path.display().to_string())
     }
 
     fn path(&self, output: &Path, extension: &str) -> PathBuf {

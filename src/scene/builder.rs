@@ -1,6 +1,6 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
-use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, TextureId};
+use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, SourceFile, TextureId};
 use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;
@@ -82,9 +82,21 @@ impl SceneBuilder {
         self.scene.cameras.push(camera);
     }
 
+    /// Says which files the scene was made from.
+    pub fn set_sources(&mut self, sources: Vec<SourceFile>) {
+        self.scene.sources = sources;
+    }
+
     /// Notes something the user should know.
     pub fn warn(&mut self, warning: impl Into<String>) {
         self.scene.warnings.push(warning.into());
+    }
+
+    /// Notes something of the file that will not be in the picture although it should.
+    pub fn lose(&mut self, warning: impl Into<String>) {
+        let warning = warning.into();
+        self.scene.losses.push(warning.clone());
+        self.scene.warnings.push(warning);
     }
 
     /// Notes a part of the file that was not needed.

@@ -67,6 +67,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
     let decode = before.elapsed().as_secs_f64();
 
     loader.note_skipped();
+    loader.builder.set_sources(doc.sources());
     let scene = loader.builder.finish();
     let total = start.elapsed().as_secs_f64();
     Ok((scene, LoadTimes { load: total - decode, decode }))
@@ -129,6 +130,13 @@ impl<'d> Loader<'d> {
     fn warn_once(&mut self, text: &'static str) {
         if self.said.insert(text) {
             self.builder.warn(text);
+        }
+    }
+
+    /// Notes the loss `text` unless it was noted before.
+    fn lose_once(&mut self, text: &'static str) {
+        if self.said.insert(text) {
+            self.builder.lose(text);
         }
     }
 
