@@ -6,7 +6,9 @@
 mod budget;
 pub mod content;
 mod describe;
+mod develop;
 pub mod fingerprint;
+pub mod html;
 pub mod input;
 pub mod job;
 mod load_stage;
@@ -23,6 +25,7 @@ pub mod up_to_date;
 mod view;
 mod write_stage;
 
+pub use develop::{Developed, Tone, develop};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

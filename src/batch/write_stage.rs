@@ -1,11 +1,12 @@
 //! Writes the pictures that were rendered, EXR first, the report last: it says what the others hold.
 
+use super::develop::develop;
 use super::fingerprint::Fingerprint;
 use super::load_stage::Sources;
 use super::output::{WriteError, write_atomic};
-use super::picture::{exr_bytes, png_bytes};
+use super::picture::exr_bytes;
 use super::render_stage::fail;
-use super::report::{self, ImageReport, Status};
+use super::report::{self, ExposureReport, ImageReport, Status};
 use super::run::{Event, ImageId, Shared};
 use crate::render::{Frame, Phase, Progress, RenderSettings};
 use std::path::{Path, PathBuf};
@@ -111,8 +112,12 @@ impl WriteStage {
         }
         if files.exr {
             let fingerprint = image.fingerprint.as_ref().map(|f| f.pixels.as_str());
-            match self.shared.beside.install(|| exr_bytes(frame, settings, files.compression, fingerprint)) {
-                Ok(bytes) => image.outputs.exr = Some(self.file(output, "exr", &bytes, &mut image.fingerprint)?),
+            match self.shared.beside.install(|| exr_bytes(frame, settings, files.format, fingerprint)) {
+                Ok((bytes, clipped)) => {
+                    image.clipped_pixels = clipped;
+                    image.warnings.extend(clipped.filter(|clipped| *clipped > 0).map(clipped_warning));
+                    image.outputs.exr = Some(self.file(output, "exr", &bytes, &mut image.fingerprint)?);
+                }
                 Err(error) => {
                     fail(image, format!("{}: {error}", image.input));
                     return Ok(());
@@ -120,11 +125,12 @@ impl WriteStage {
             }
         }
         if files.png {
-            let (bytes, nan_channels) = png_bytes(frame, &files.tone);
-            if nan_channels > 0 {
-                image.warnings.push(format!("{nan_channels} channels of the picture are NaN; the PNG shows them as 0"));
-            }
-            image.outputs.png = Some(self.file(output, "png", &bytes, &mut image.fingerprint)?);
+            let size = [frame.window.width, frame.window.height];
+            let developed = develop(&frame.pixels, None, size, files.tone);
+            image.exposure = Some(ExposureReport::new(files.tone.exposure, developed.exposure));
+            image.notes.extend(developed.notes);
+            image.warnings.extend(developed.warnings);
+            image.outputs.png = Some(self.file(output, "png", &developed.png, &mut image.fingerprint)?);
         }
         image.status = Status::Rendered;
         Ok(())
@@ -145,4 +151,10 @@ impl WriteStage {
         }
         Ok(path.display().to_string())
     }
+}
+
+fn clipped_warning(clipped: u64) -> String {
+    format!(
+        "{clipped} pixels are beyond 65504, the most that --exr half holds, and were clipped; --exr float keeps them"
+    )
 }

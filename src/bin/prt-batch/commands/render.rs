@@ -3,8 +3,8 @@
 use crate::args::RenderArgs;
 use crate::term::{self, Reporter, Verbosity};
 use prt::batch::input::expand;
-use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, View};
-use prt::color::ToneMap;
+use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, Tone, View};
+use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
 use std::path::{Path, PathBuf};
@@ -78,8 +78,8 @@ fn file_settings(args: &RenderArgs) -> FileSettings {
         files: FileOptions {
             exr: !args.no_exr,
             png: !args.no_png,
-            compression: args.exr_compression,
-            tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
+            format: ExrOptions { samples: args.exr, compression: args.exr_compression },
+            tone: Tone { exposure: args.exposure, curve: args.tonemap },
         },
     }
 }
