@@ -44,6 +44,7 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.notes.extend(stats.default_light.note());
     image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
     image.warnings.extend(stats.warnings.iter().cloned());
+    image.losses.extend(stats.losses.iter().cloned());
 }
 
 /// The option's value.

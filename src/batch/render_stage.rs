@@ -83,6 +83,7 @@ impl RenderStage {
             image.scene = Some(scene.index);
             image.camera = reported_name(&names, camera);
             image.warnings.clone_from(&scene.warnings);
+            image.losses.clone_from(&scene.losses);
             image.skipped.clone_from(&scene.skipped);
             let mut made = Made { task, id, progress, image, output: None, frame: None, is_bad_input: false };
             // Names that were guessed before loading are known now.

@@ -60,6 +60,8 @@ pub struct ImageReport {
     pub features: BTreeMap<String, bool>,
     pub skipped: Vec<Skipped>,
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the file is not in the picture: `--strict` fails on them.
+    pub losses: Vec<String>,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
@@ -78,6 +80,7 @@ impl ImageReport {
         if let Some(count) = self.non_finite_samples.filter(|count| *count > 0) {
             failures.push(format!("{count} samples were not finite and were dropped"));
         }
+        failures.extend(self.losses.iter().cloned());
         failures
     }
 }

@@ -147,6 +147,20 @@ fn an_empty_scene_is_no_failure_unless_strict() {
 }
 
 #[test]
+fn strict_fails_where_something_of_the_file_is_not_in_the_picture() {
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("a.obj");
+    std::fs::write(&path, "mtllib nosuch.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    for (strict, code) in [(false, 0), (true, 1)] {
+        let settings = BatchSettings { strict, ..settings(&root.path().join("out"), std::slice::from_ref(&path)) };
+        let outcome = run(settings, &mut Listener::default()).unwrap();
+        let image = &outcome.report.images[0];
+        assert_eq!((outcome.exit_code(), image.status), (code, Status::Rendered));
+        assert!(image.losses[0].contains("nosuch.mtl") && image.warnings.contains(&image.losses[0]), "{image:?}");
+    }
+}
+
+#[test]
 fn a_panic_becomes_an_error_with_its_text() {
     let error = guarded::<()>(|| panic!("index {} out of range", 7)).unwrap_err();
     assert!(error.contains("internal error: index 7 out of range"), "{error}");

@@ -141,6 +141,7 @@ fn render_here(
         accel: prepared.accel_report,
         lanes: level.lanes(),
         warnings,
+        losses: prepared.losses,
     };
     let frame_camera = FrameCamera {
         world_from_camera: camera.world_from_camera,

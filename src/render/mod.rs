@@ -79,6 +79,8 @@ pub struct RenderStats {
     pub lanes: u32,
     /// Said to the user and written into the JSON.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the scene is not in the picture.
+    pub losses: Vec<String>,
 }
 
 /// A rendered picture. `pixels` covers `window` only, row by row from the top.

@@ -69,6 +69,8 @@ pub struct Scene {
     pub index: usize,
     /// Said to the user and written into the JSON.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the file is not in the picture.
+    pub losses: Vec<String>,
     /// Parts of the file that were not needed.
     pub skipped: Vec<Skipped>,
 }
