@@ -1,11 +1,11 @@
 //! Reads scenes, one ahead of the one that is rendered.
 
+use super::panics::guarded;
 use super::render_stage::Loaded;
 use super::run::{Event, Shared, names_of};
 use super::settings::Task;
 use crate::load::{LoadTimes, load};
 use crate::scene::Scene;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, SyncSender};
@@ -65,13 +65,4 @@ impl LoadStage {
         });
         Loaded { task, id, progress, contents, seconds: clock.elapsed().as_secs_f64() }
     }
-}
-
-/// Runs `work`; a panic in it becomes an error, so that the batch goes on.
-pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-        Err(format!("internal error: {text}\n  This is a bug in prt-batch, please report it with the file."))
-    })
 }

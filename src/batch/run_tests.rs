@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::batch::input::expand;
-use crate::batch::load_stage::guarded;
 use crate::render::RenderSettings;
 
 /// Remembers what it was told.
@@ -158,12 +157,6 @@ fn strict_fails_where_something_of_the_file_is_not_in_the_picture() {
         assert_eq!((outcome.exit_code(), image.status), (code, Status::Rendered));
         assert!(image.losses[0].contains("nosuch.mtl") && image.warnings.contains(&image.losses[0]), "{image:?}");
     }
-}
-
-#[test]
-fn a_panic_becomes_an_error_with_its_text() {
-    let error = guarded::<()>(|| panic!("index {} out of range", 7)).unwrap_err();
-    assert!(error.contains("internal error: index 7 out of range"), "{error}");
 }
 
 #[test]
