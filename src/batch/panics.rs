@@ -60,7 +60,7 @@ mod tests {
         let told = format!("internal error: index 8 out of range (src/batch/panics.rs:{line})\n");
         assert!(error.starts_with(&told) && error.contains("bug"), "{error}");
         // Rayon carries a panic from the worker that had it to the one that waits.
-        let error = guarded::<()>(|| rayon::join(|| panic!("index 9 out of range"), || Ok(())).0).unwrap_err();
+        let error = guarded::<()>(|| rayon::join(|| panic!("index 9 out of range"), || ()).0).unwrap_err();
         assert!(error.contains("index 9 out of range (src/batch/panics.rs:"), "{error}");
     }
 }

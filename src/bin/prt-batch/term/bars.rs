@@ -181,20 +181,35 @@ mod tests {
         assert_eq!(
             shown(130),
             "\
-shots/a rat…name of a scene.Main  writing    ██████████████  100 %                -            -           - left
-cornell                           rendering  ██████░░░░░░░░   43 %  12.3 Msamples/s      82 Mray/s  1 min 03 s left
-"
+shots/a rat…ong name of a scene.Main  writing    ████████████████████████  100 %                -            -           - left
+cornell                               rendering  ██████████░░░░░░░░░░░░░░   43 %  12.3 Msamples/s    82 Mray/s  1 min 03 s left
+光の部屋                              loading    ░░░░░░░░░░░░░░░░░░░░░░░░      -                -            -           - left
+12 of 500 images  ░░░░░░░░░░░░░░░░░░░░░░░░  1 min 03 s, about 2 h 05 min left"
         );
     }
 
     #[test]
     fn a_terminal_of_80_columns_keeps_name_phase_bar_percent_and_end() {
-        assert_eq!(shown(80), "");
+        assert_eq!(
+            shown(80),
+            "\
+shots… scene.Main  writing    ██████████  100 %            -           - left
+cornell            rendering  ████░░░░░░   43 %    82 Mray/s  1 min 03 s left
+光の部屋           loading    ░░░░░░░░░░      -            -           - left
+12 of 500 images  ░░░░░░░░░░  1 min 03 s, about 2 h 05 min left"
+        );
     }
 
     #[test]
     fn a_terminal_of_20_columns_keeps_name_and_percent() {
-        assert_eq!(shown(20), "");
+        assert_eq!(
+            shown(20),
+            "\
+sho…e.Main  100 %
+cornell      43 %
+光の部屋        -
+12/500"
+        );
     }
 
     #[test]
@@ -208,7 +223,7 @@ cornell                           rendering  ██████░░░░░�
     fn one_image_has_no_line_for_the_run_and_nothing_is_promised_that_is_not_known() {
         let images = vec![ImageView { name: "a".into(), phase: Phase::Building, ..Default::default() }];
         let view = View { all: 1, images, ..View::default() };
-        assert_eq!(lines(&view, 40, Look::ascii(Paint::OFF)), [""]);
+        assert_eq!(lines(&view, 40, Look::ascii(Paint::OFF)), ["a  building       -           - left"]);
     }
 
     #[test]

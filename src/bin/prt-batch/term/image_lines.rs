@@ -1,7 +1,7 @@
 //! What is said about one finished image.
 
 use super::style::Paint;
-use super::text::{indented, mrays_per_s, printable, seconds};
+use super::text::{count, indented, mrays_per_s, printable, seconds};
 use prt::batch::report::{Accel, ImageReport, Status};
 
 /// As users read it.
@@ -63,7 +63,8 @@ pub fn details(image: &ImageReport) -> Vec<String> {
     }
     if let (Some(rays), Some(triangles)) = (&image.rays, image.triangles) {
         let (camera, bounce, shadow) = (rays.camera, rays.bounce, rays.shadow);
-        lines.push(format!("  {triangles} triangles; rays: {camera} camera, {bounce} bounce, {shadow} shadow"));
+        let triangles = count(triangles, "triangle");
+        lines.push(format!("  {triangles}; rays: {camera} camera, {bounce} bounce, {shadow} shadow"));
     }
     lines.extend(image.skipped.iter().map(|s| format!("  skipped {}: {}", printable(&s.what), printable(&s.why))));
     lines

@@ -41,7 +41,8 @@ impl Repeats {
     /// For each text that was not shown every time, how often it was not.
     pub fn rest(&self) -> Vec<(Level, String)> {
         let hidden = self.order.iter().filter(|repeated| repeated.images > SHOWN);
-        let line = |r: &Repeated| (r.level, format!("and {}: {}", count(r.images - SHOWN, "more image"), r.text));
+        let line =
+            |r: &Repeated| (r.level, format!("and {}: {}", count((r.images - SHOWN) as u64, "more image"), r.text));
         hidden.map(line).collect()
     }
 }

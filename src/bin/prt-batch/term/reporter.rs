@@ -86,7 +86,7 @@ impl Reporter {
             interrupted(&format!(
                 "{} of {} {are} done; the same command goes on from there",
                 all - left,
-                count(all, "image")
+                count(all as u64, "image")
             ));
         }
     }

@@ -106,7 +106,7 @@ pub fn mrays(rate: f64) -> String {
 }
 
 /// `1 image`, `2 images`.
-pub fn count(n: usize, what: &str) -> String {
+pub fn count(n: u64, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
