@@ -3,7 +3,9 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+pub mod content;
 mod describe;
+pub mod fingerprint;
 pub mod input;
 pub mod job;
 mod load_stage;
@@ -17,6 +19,7 @@ pub mod report;
 mod run;
 mod settings;
 mod size;
+pub mod up_to_date;
 mod view;
 mod write_stage;
 
