@@ -67,7 +67,7 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--integrator", "ao", "not built yet"),
         ("--exr", "double", "float, half"),
         ("--exr-compression", "dwaa", "zip, zips, piz, rle, none"),
-        ("--progress", "json", "not built yet"),
+        ("--progress", "dots", "auto, plain, json, none"),
         ("--threads", "0", "from 1"),
         ("--name", "{steam}", "{stem}, {parent}, {camera}"),
         ("--name", "{frame}", "not built yet"),

@@ -1,6 +1,7 @@
 //! Reads scenes, one ahead of the one that is rendered.
 
 use super::content::{InputRecord, hash_sources};
+use super::panics::guarded;
 use super::render_stage::Loaded;
 use super::report::ImageReport;
 use super::run::{Event, ImageId, Shared, names_of};
@@ -9,7 +10,6 @@ use super::up_to_date::Why;
 use crate::load::{LoadTimes, load};
 use crate::render::Progress;
 use crate::scene::{Scene, SourceFile};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -132,13 +132,4 @@ impl LoadStage {
             },
         )
     }
-}
-
-/// Runs `work`; a panic in it becomes an error, so that the batch goes on.
-pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-        Err(format!("internal error: {text}\n  This is a bug in prt-batch, please report it with the file."))
-    })
 }

@@ -14,6 +14,7 @@ pub mod job;
 mod load_stage;
 pub mod names;
 pub mod output;
+pub mod panics;
 mod peek;
 mod picture;
 mod render_stage;

@@ -1,7 +1,8 @@
 //! Renders the scenes that were read.
 
 use super::describe::{blank, describe};
-use super::load_stage::{Contents, SceneFile, guarded};
+use super::load_stage::{Contents, SceneFile};
+use super::panics::guarded;
 use super::report::{ImageReport, Status};
 use super::run::{Event, ImageId, Shared, reported_name};
 use super::settings::Task;

@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::batch::input::expand;
-use crate::batch::load_stage::guarded;
 use crate::render::RenderSettings;
 
 /// Remembers what it was told.
@@ -187,12 +186,6 @@ fn a_panic_in_one_image_stays_with_it() {
     let message = outcome.report.images[1].error_message.as_ref().unwrap();
     assert!(message.contains("t001.gltf") && message.contains("internal error: 3 lanes"), "{message}");
     assert_eq!(outcome.exit_code(), 1);
-}
-
-#[test]
-fn a_panic_becomes_an_error_with_its_text() {
-    let error = guarded::<()>(|| panic!("index {} out of range", 7)).unwrap_err();
-    assert!(error.contains("internal error: index 7 out of range"), "{error}");
 }
 
 #[test]

@@ -161,7 +161,7 @@ pub struct RenderArgs {
     /// Render even what is up to date
     #[arg(long)]
     pub force: bool,
-    /// On stderr: auto (a bar on a terminal, else plain), plain (at most one line a second) or none
+    /// On stderr: auto (bars on a terminal, else plain), plain (at most one line a second), json or none
     #[arg(long, value_name = "STYLE", default_value = "auto", value_parser = parse::progress)]
     pub progress: ProgressStyle,
     /// Print the run's batch.json on stdout

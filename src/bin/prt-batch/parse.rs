@@ -155,12 +155,13 @@ pub fn exr_compression(value: &str) -> Result<ExrCompression, String> {
 pub enum ProgressStyle {
     Auto,
     Plain,
+    Json,
     None,
 }
 
 pub fn progress(value: &str) -> Result<ProgressStyle, String> {
-    use ProgressStyle::{Auto, None, Plain};
-    word(value, &[("auto", Auto), ("plain", Plain), ("none", None)], &["json"])
+    use ProgressStyle::{Auto, Json, None, Plain};
+    word(value, &[("auto", Auto), ("plain", Plain), ("json", Json), ("none", None)], &[])
 }
 
 pub fn name(value: &str) -> Result<NameTemplate, String> {

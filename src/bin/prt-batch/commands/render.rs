@@ -1,6 +1,7 @@
 //! `prt-batch INPUT...`
 
 use crate::args::RenderArgs;
+use crate::signals;
 use crate::term::{self, Reporter, Verbosity};
 use prt::batch::input::expand;
 use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, Tone, View};
@@ -31,9 +32,12 @@ pub fn run(args: &RenderArgs) -> ExitCode {
         _ => Verbosity::Normal,
     };
     let mut reporter = Reporter::new(args.progress, verbosity);
+    if let Err(error) = signals::install(&settings.cancel) {
+        term::warning(&format!("signals will end the process at once: {error}"));
+    }
     match batch::run(settings, &mut reporter) {
         Ok(outcome) => {
-            reporter.summary(&outcome);
+            reporter.summary(&outcome, &args.out);
             if args.json {
                 term::print(&batch::report::to_json(&outcome.report));
             }
