@@ -3,8 +3,10 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+pub mod host;
 pub mod input;
 pub mod job;
+pub mod memory;
 pub mod names;
 pub mod output;
 mod peek;

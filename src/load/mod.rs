@@ -1,9 +1,12 @@
 //! Files to [`Scene`]s, by extension.
 
+mod estimate;
 mod folders;
 pub mod gltf;
 pub mod obj;
 mod tangents;
+
+pub use estimate::{LoadEstimate, estimate};
 
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};

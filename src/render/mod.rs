@@ -2,17 +2,24 @@
 
 mod default_light;
 mod emission;
+mod features;
 mod frame;
 mod framing;
+pub mod memory;
+mod pilot;
 mod prepare;
 mod schedule;
 mod settings;
+mod tracer;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
+pub use features::features;
 pub use frame::render;
 pub use framing::FRAMING_YFOV;
+pub use pilot::{Pilot, pilot};
 pub use prepare::{Prepared, prepare};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
+pub use tracer::{camera, on_threads, window};
 
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
