@@ -2,7 +2,7 @@
 //! process of its own that renders it takes at most (where the system tells).
 
 use prt::batch::job::CameraChoice;
-use prt::batch::{BatchSettings, CameraSource, FileOptions, Observer, PictureSize, report, run};
+use prt::batch::{BatchSettings, FileSettings, Observer, PictureSize, input::expand, report, run};
 use prt::load::{self, LoadOptions, load};
 use prt::render::memory::{Encoded, estimate};
 use prt::render::{AccelChoice, RenderSettings};
@@ -66,19 +66,15 @@ fn estimated(case: &Case, file: PathBuf) {
 /// Child: renders `file` and says what this process took.
 fn measured(case: &Case, file: PathBuf) {
     let out = std::env::temp_dir().join(format!("prt-memory-{}", std::process::id()));
-    let settings = BatchSettings {
-        inputs: vec![file],
-        out: out.clone(),
-        name: None,
+    let one = FileSettings {
         size: PictureSize::Exact(case.size.0, case.size.1),
-        camera_source: CameraSource::Inputs,
         cameras: CameraChoice::Index(0),
-        load: LoadOptions::default(),
         render: case.render.clone(),
-        files: FileOptions::default(),
-        command: String::new(),
+        ..FileSettings::default()
     };
-    let outcome = run(&settings, &mut Silent);
+    let tasks = BatchSettings::tasks_for(expand(&[file]), one);
+    let settings = BatchSettings { tasks, out: out.clone(), ..BatchSettings::default() };
+    let outcome = run(settings, &mut Silent);
     let _ = std::fs::remove_dir_all(&out);
     match outcome {
         Ok(outcome) if outcome.exit_code() == 0 => println!("{}", report::peak_rss_bytes().unwrap_or(0)),
@@ -107,7 +103,9 @@ fn main() -> ExitCode {
     let (case, files) = Case::from_words(&words);
     let options: Vec<String> = words.iter().filter(|w| !files.contains(&PathBuf::from(w))).cloned().collect();
     println!("MiB; {}x{}, {} spp", case.size.0, case.size.1, case.render.spp);
-    println!("triangles estimated measured ratio | load peak | program loading left scene prepared building film files");
+    println!(
+        "triangles estimated measured ratio | load peak | program loading left scene prepared building film files"
+    );
     let mut is_good = true;
     for file in files {
         let mut words = options.clone();

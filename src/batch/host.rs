@@ -180,6 +180,10 @@ mod tests {
         let total = memory_total().unwrap();
         assert!((1 << 26..1 << 50).contains(&total), "{total}");
         assert!(memory_available().unwrap() <= total);
-        assert!(threads() >= 1 && processors().unwrap() >= 1 && affinity().unwrap().starts_with(|c: char| c.is_ascii_digit()));
+        assert!(
+            threads() >= 1
+                && processors().unwrap() >= 1
+                && affinity().unwrap().starts_with(|c: char| c.is_ascii_digit())
+        );
     }
 }

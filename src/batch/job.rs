@@ -3,7 +3,9 @@
 use super::input::{Input, extension_rank};
 use super::names::{NameFields, NameTemplate, camera_labels};
 use super::peek;
+use super::settings::Task;
 use std::collections::HashMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Which cameras of a file.
@@ -77,35 +79,31 @@ fn labels_of(names: &[String]) -> Vec<String> {
     if names.is_empty() { vec!["0".into()] } else { camera_labels(names) }
 }
 
-/// Output names of every input, and the input (by index) to which each name belongs.
+/// Output names of every task, and the task (by index) to which each name belongs.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
-    /// For each input.
+    /// For each task.
     pub namings: Vec<Naming>,
-    /// Output path without extension to input.
+    /// For each task, the names of its cameras as far as they are known without loading: to be checked again.
+    pub cameras: Vec<Vec<String>>,
+    /// Output path without extension to task.
     pub owners: HashMap<PathBuf, usize>,
 }
 
-/// Names for the outputs of all `inputs`; `elsewhere` has the names of the cameras that all of them are to be seen by,
-/// if not by their own.
+/// Names for the outputs of all `tasks`; `elsewhere` has, for each of them, the names of the cameras that it is to be
+/// seen by, if not by its own.
 ///
 /// # Errors
 /// Two images would write one file, or a name is reserved: says which, and the `--name` that would tell them apart.
-pub fn plan(
-    inputs: &[Input],
-    template: Option<&NameTemplate>,
-    cameras: &CameraChoice,
-    scene: Option<&str>,
-    elsewhere: Option<&[String]>,
-) -> Result<Plan, String> {
-    let names: Vec<Vec<String>> = (inputs.iter())
-        .map(|input| match (&input.problem, elsewhere) {
+pub fn plan(tasks: &[Task], elsewhere: &[Option<Vec<String>>]) -> Result<Plan, String> {
+    let cameras: Vec<Vec<String>> = (tasks.iter().zip(elsewhere))
+        .map(|(Task { input, settings }, elsewhere)| match (&input.problem, elsewhere) {
             (Some(_), _) => Vec::new(),
-            (None, Some(names)) => names.to_vec(),
-            (None, None) => peek::camera_names(&input.path, scene).unwrap_or_default(),
+            (None, Some(names)) => names.clone(),
+            (None, None) => peek::camera_names(&input.path, settings.load.scene.as_deref()).unwrap_or_default(),
         })
         .collect();
-    try_plan(inputs, template, cameras, &names).map_err(|clash| {
+    let named = try_plan(tasks, None, &cameras).map_err(|clash| {
         const CANDIDATES: [&str; 6] = [
             // By camera only after by folder: names of cameras differ by luck between files.
             "{parent}-{stem}",
@@ -117,27 +115,34 @@ pub fn plan(
         ];
         let works = |candidate: &&&str| {
             let candidate = NameTemplate::parse(candidate).expect("the candidates are valid templates");
-            try_plan(inputs, Some(&candidate), cameras, &names).is_ok()
+            try_plan(tasks, Some(&candidate), &cameras).is_ok()
         };
         match CANDIDATES.iter().find(works) {
             Some(name) => format!("{clash}\n  Use --name '{name}' to tell them apart."),
             None => format!("{clash}\n  Render them in separate runs with different --out."),
         }
-    })
+    });
+    Ok(Plan { cameras, ..named? })
 }
 
-fn try_plan(
-    inputs: &[Input],
-    template: Option<&NameTemplate>,
-    cameras: &CameraChoice,
-    names: &[Vec<String>],
-) -> Result<Plan, String> {
+/// With the template `instead` in place of the tasks' own, if there is one.
+fn try_plan(tasks: &[Task], instead: Option<&NameTemplate>, names: &[Vec<String>]) -> Result<Plan, String> {
     let mut plan = Plan::default();
-    for (index, input) in inputs.iter().enumerate() {
-        let naming = naming(input, inputs, template);
+    // What decides about a plain stem: the first type of a stem in a folder. By hash, as a batch may have 10^5 files.
+    let mut first_types: HashMap<(&Path, Option<&Path>, Option<&OsStr>), usize> = HashMap::new();
+    for Task { input, .. } in tasks.iter().filter(|task| task.input.problem.is_none()) {
+        if let Some(rank) = extension_rank(&input.path) {
+            let first = first_types.entry(stem_key(input)).or_insert(rank);
+            *first = rank.min(*first);
+        }
+    }
+    for (index, Task { input, settings }) in tasks.iter().enumerate() {
+        let is_shadowed =
+            first_types.get(&stem_key(input)).is_some_and(|first| Some(*first) < extension_rank(&input.path));
+        let naming = naming(input, is_shadowed, instead.or(settings.name.as_ref()));
         if input.problem.is_none() {
             // A camera that is not there fails this file later; it writes under one name all the same.
-            let chosen = cameras.select(&names[index]).unwrap_or_else(|_| vec![0]);
+            let chosen = settings.cameras.select(&names[index]).unwrap_or_else(|_| vec![0]);
             for output in naming.outputs(&names[index], &chosen) {
                 check_reserved(&output, &input.path)?;
                 if let Some(other) = plan.owners.insert(output.clone(), index) {
@@ -145,7 +150,7 @@ fn try_plan(
                     return Err(if other == index {
                         format!("{path}: several cameras would be written to one name, {output}")
                     } else {
-                        let other = inputs[other].path.display();
+                        let other = tasks[other].input.path.display();
                         format!("{other} and {path} would both be written to {output}")
                     });
                 }
@@ -154,6 +159,11 @@ fn try_plan(
         plan.namings.push(naming);
     }
     Ok(plan)
+}
+
+/// What inputs that compete for a plain output name have in common: output folder, folder, stem.
+fn stem_key(input: &Input) -> (&Path, Option<&Path>, Option<&OsStr>) {
+    (&input.folder, input.path.parent(), input.path.file_stem())
 }
 
 /// `batch.json` and `index.html` at the top of the output folder belong to the run.
@@ -166,20 +176,11 @@ fn check_reserved(output: &Path, input: &Path) -> Result<(), String> {
     }
 }
 
-fn naming(input: &Input, inputs: &[Input], template: Option<&NameTemplate>) -> Naming {
-    let text = |part: Option<&std::ffi::OsStr>| part.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut stem = text(input.path.file_stem());
-    // A type that comes later in the list than another of the same stem adds its extension.
-    let shadowed = inputs.iter().any(|other| {
-        other.folder == input.folder
-            && other.path.parent() == input.path.parent()
-            && other.path.file_stem() == input.path.file_stem()
-            && extension_rank(&other.path) < extension_rank(&input.path)
-            && other.problem.is_none()
-    });
-    if template.is_none() && shadowed {
-        stem = text(input.path.file_name());
-    }
+/// `is_shadowed`: a type that comes earlier in the list has the same stem, so this one adds its extension.
+fn naming(input: &Input, is_shadowed: bool, template: Option<&NameTemplate>) -> Naming {
+    let text = |part: Option<&OsStr>| part.map(|p| p.to_string_lossy().into_owned()).unwrap_or_default();
+    let is_shadowed = is_shadowed && template.is_none();
+    let stem = text(if is_shadowed { input.path.file_name() } else { input.path.file_stem() });
     let parent = std::path::absolute(&input.path).unwrap_or_else(|_| input.path.clone());
     let parent = parent.parent().map(|p| p.canonicalize().unwrap_or_else(|_| p.to_owned())).unwrap_or_default();
     Naming { folder: input.folder.clone(), stem, parent: text(parent.file_name()), template: template.cloned() }
@@ -188,16 +189,17 @@ fn naming(input: &Input, inputs: &[Input], template: Option<&NameTemplate>) -> N
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::settings::{BatchSettings, FileSettings};
 
-    fn input(path: &str) -> Input {
-        Input { path: path.into(), folder: PathBuf::new(), problem: None }
+    fn tasks(paths: &[&str], template: Option<&str>) -> Vec<Task> {
+        let input = |path: &&str| Input { path: path.into(), folder: PathBuf::new(), problem: None };
+        let name = template.map(|t| NameTemplate::parse(t).unwrap());
+        BatchSettings::tasks_for(paths.iter().map(input).collect(), FileSettings { name, ..FileSettings::default() })
     }
 
     fn outputs(paths: &[&str], template: Option<&str>, cameras: &[&[&str]]) -> Result<Vec<String>, String> {
-        let inputs: Vec<_> = paths.iter().map(|p| input(p)).collect();
-        let template = template.map(|t| NameTemplate::parse(t).unwrap());
         let names: Vec<Vec<String>> = cameras.iter().map(|c| c.iter().map(|n| n.to_string()).collect()).collect();
-        let plan = try_plan(&inputs, template.as_ref(), &CameraChoice::All, &names)?;
+        let plan = try_plan(&tasks(paths, template), None, &names)?;
         let outputs = plan.namings.iter().zip(&names);
         let all = |names: &[String]| CameraChoice::All.select(names).unwrap();
         Ok(outputs.flat_map(|(n, names)| n.outputs(names, &all(names))).map(|p| p.to_str().unwrap().into()).collect())
@@ -219,10 +221,7 @@ mod tests {
 
     #[test]
     fn clashes_and_reserved_names_are_refused_with_a_name_that_works() {
-        let refused = |paths: &[&str]| {
-            let inputs: Vec<_> = paths.iter().map(|p| input(p)).collect();
-            plan(&inputs, None, &CameraChoice::All, None, None).unwrap_err()
-        };
+        let refused = |paths: &[&str]| plan(&tasks(paths, None), &vec![None; paths.len()]).unwrap_err();
         let clash = refused(&["s/a.gltf", "t/a.gltf"]);
         assert!(clash.contains("s/a.gltf and t/a.gltf would both") && clash.contains("--name '{parent}-{stem}'"));
         let reserved = refused(&["s/batch.gltf"]);

@@ -1,7 +1,13 @@
 //! The memory budget: `--memory`, what it is by default, and the refusal of what would not fit in it.
 
 use super::host;
-use crate::render::memory::MemoryEstimate;
+use super::settings::FileSettings;
+use super::size::PictureSize;
+use crate::load::{self, LoadEstimate};
+use crate::render::RenderSettings;
+use crate::render::memory::{Encoded, MemoryEstimate, estimate, of_picture};
+use crate::scene::Scene;
+use std::path::Path;
 use std::str::FromStr;
 
 /// Share of the memory that this process may use which is the budget by default.
@@ -51,7 +57,7 @@ impl FromStr for MemoryLimit {
 
 /// How much memory may be used, and who said so.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
+pub struct MemoryBudget {
     /// Bytes; `u64::MAX` where neither the user nor the system sets a limit.
     pub bytes: u64,
     /// The user set it.
@@ -60,7 +66,7 @@ pub struct Budget {
     pub total: Option<u64>,
 }
 
-impl Budget {
+impl MemoryBudget {
     /// The budget of a run: `limit`, else [`DEFAULT_SHARE`] of what this process may use.
     pub fn new(limit: Option<MemoryLimit>) -> Self {
         Self::of(limit, host::memory_total())
@@ -103,12 +109,55 @@ impl Budget {
                  smaller with --size."
             ),
             _ => {
-                let total = self.total.map_or_else(String::new, |total| format!(" (this process may use {})", amount(total)));
+                let total =
+                    self.total.map_or_else(String::new, |total| format!(" (this process may use {})", amount(total)));
                 format!("Allow more with --memory{total}, or make the scene or its pictures smaller.")
             }
         };
         Err(format!("would take about {needs} of memory ({}), more than {limit}\n  {fix}", parts.join(", ")))
     }
+}
+
+impl MemoryBudget {
+    /// Whether the pictures that `settings` ask for fit whatever is in them, as far as their size is known without a
+    /// camera.
+    ///
+    /// # Errors
+    /// See [`MemoryBudget::check`]; the text names the option.
+    pub(super) fn check_picture(&self, settings: &FileSettings) -> Result<(), String> {
+        let PictureSize::Exact(width, height) = settings.size else { return Ok(()) };
+        let render = RenderSettings { width, height, ..settings.render.clone() };
+        let window = crate::render::window(&render);
+        self.check(&of_picture(&render, encoded(settings)), Some((window.width, window.height)))
+            .map_err(|why| format!("--size {width}x{height} {why}"))
+    }
+
+    /// What reading `path` takes, if that fits.
+    ///
+    /// # Errors
+    /// See [`MemoryBudget::check`]; the text names the file.
+    pub(super) fn check_loading(&self, path: &Path, settings: &FileSettings) -> Result<LoadEstimate, String> {
+        let reading = load::estimate(path, &settings.load).unwrap_or_default();
+        let program = of_picture(&settings.render, encoded(settings)).program;
+        let need = MemoryEstimate { program, loading: reading.bytes, ..MemoryEstimate::default() };
+        self.check(&need, None).map_err(|why| format!("{}: {why}", path.display()))?;
+        Ok(reading)
+    }
+}
+
+/// What an image of `scene`, which took `reading` to read, takes; `render` has its size.
+pub(super) fn need(
+    scene: &Scene,
+    reading: LoadEstimate,
+    render: &RenderSettings,
+    settings: &FileSettings,
+) -> MemoryEstimate {
+    let all = estimate(scene, render, encoded(settings));
+    MemoryEstimate { loading: reading.bytes, left_over: reading.left_over, ..all }
+}
+
+fn encoded(settings: &FileSettings) -> Encoded {
+    Encoded { exr: settings.files.exr, png: settings.files.png }
 }
 
 /// Bytes for people: `75.2 GiB`, `12 MiB`, `3 KiB`.
@@ -128,8 +177,6 @@ pub fn amount(bytes: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::RenderSettings;
-    use crate::render::memory::{Encoded, of_picture};
 
     #[test]
     fn amounts_have_binary_and_decimal_units_and_shares() {
@@ -151,7 +198,9 @@ mod tests {
         ] {
             assert_eq!(text.parse(), Ok(expected), "{text}");
         }
-        for text in ["", "8", "GiB", "-1GiB", "0", "0GiB", "0.1B", "8Gi", "8G", "1e30TB", "nan", "inf", "0%", "101%", "%"] {
+        for text in
+            ["", "8", "GiB", "-1GiB", "0", "0GiB", "0.1B", "8Gi", "8G", "1e30TB", "nan", "inf", "0%", "101%", "%"]
+        {
             let parsed = text.parse::<MemoryLimit>();
             // A bare number is bytes, however few.
             assert_eq!(parsed.is_ok(), text == "8", "{text}: {parsed:?}");
@@ -163,15 +212,15 @@ mod tests {
 
     #[test]
     fn the_default_is_a_share_of_what_this_process_may_use() {
-        assert_eq!(Budget::of(None, Some(10 << 30)).bytes, 8 << 30);
-        assert_eq!(Budget::of(Some(MemoryLimit::Share(0.5)), Some(10 << 30)).bytes, 5 << 30);
-        assert_eq!(Budget::of(Some(MemoryLimit::Bytes(7)), None).bytes, 7);
-        assert_eq!(Budget::of(None, None).bytes, u64::MAX);
+        assert_eq!(MemoryBudget::of(None, Some(10 << 30)).bytes, 8 << 30);
+        assert_eq!(MemoryBudget::of(Some(MemoryLimit::Share(0.5)), Some(10 << 30)).bytes, 5 << 30);
+        assert_eq!(MemoryBudget::of(Some(MemoryLimit::Bytes(7)), None).bytes, 7);
+        assert_eq!(MemoryBudget::of(None, None).bytes, u64::MAX);
     }
 
     #[test]
     fn a_picture_that_does_not_fit_is_refused_with_its_parts_the_limit_and_a_remedy() {
-        let budget = Budget::of(None, Some(24 << 30));
+        let budget = MemoryBudget::of(None, Some(24 << 30));
         let files = Encoded { exr: true, png: true };
         for (width, height) in [(40_000, 25_000), (65_536, 65_536)] {
             let settings = RenderSettings { width, height, threads: Some(2), ..RenderSettings::default() };
@@ -184,7 +233,7 @@ mod tests {
         let small = RenderSettings { threads: Some(2), ..RenderSettings::default() };
         assert_eq!(budget.check(&of_picture(&small, files), None), Ok(()));
         let scene = MemoryEstimate { scene: 30 << 30, ..of_picture(&small, files) };
-        let why = Budget { is_typed: true, ..budget }.check(&scene, Some((1280, 720))).unwrap_err();
+        let why = MemoryBudget { is_typed: true, ..budget }.check(&scene, Some((1280, 720))).unwrap_err();
         assert!(why.contains("(scene 30.0 GiB)") && why.contains("more than --memory 19.2 GiB"), "{why}");
         assert!(why.contains("Allow more with --memory (this process may use 24.0 GiB)"), "{why}");
     }
@@ -194,7 +243,9 @@ mod tests {
         for (bytes, text) in [(0, "0 KiB"), (3 << 10, "3 KiB"), (5 << 20, "5.0 MiB"), (300 << 20, "300 MiB")] {
             assert_eq!(amount(bytes), text);
         }
-        for (bytes, text) in [(1 << 30, "1.0 GiB"), (77_u64 << 30, "77.0 GiB"), (2 << 40, "2.0 TiB"), (u64::MAX, "16777216 TiB")] {
+        for (bytes, text) in
+            [(1 << 30, "1.0 GiB"), (77_u64 << 30, "77.0 GiB"), (2 << 40, "2.0 TiB"), (u64::MAX, "16777216 TiB")]
+        {
             assert_eq!(amount(bytes), text);
         }
     }

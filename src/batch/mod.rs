@@ -1,22 +1,30 @@
-//! Many files to many pictures, without a terminal: inputs become jobs with output names ([`job`]), [`run()`] loads,
-//! renders and writes them, and says what happened in a [`report`].
+//! Many files to many pictures, without a terminal: inputs with their settings ([`Task`]) become jobs with output names
+//! ([`job`]), [`run()`] loads, renders and writes them, and says what happened in a [`report`].
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+mod describe;
+pub mod doctor;
+pub mod explain;
 pub mod host;
 pub mod input;
 pub mod job;
+mod load_stage;
 pub mod memory;
 pub mod names;
 pub mod output;
 mod peek;
 mod picture;
+mod render_stage;
 pub mod report;
 mod run;
+mod settings;
 mod size;
 mod view;
+mod write_stage;
 
 pub use picture::FileOptions;
-pub use run::{BatchSettings, Observer, Outcome, Stop, run};
+pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
+pub use settings::{BatchSettings, FileSettings, Task};
 pub use size::{MAX_SIDE, PictureSize};
 pub use view::{CameraSource, View};

@@ -2,22 +2,23 @@
 //! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
 
 use crate::scene::Skipped;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// How an image ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Its files are written.
     Rendered,
-    /// Its files were there already (not built: everything renders).
+    /// Its files were there already.
     UpToDate,
     /// Nothing to draw: no picture, no failure.
     Empty,
     /// No picture; `error_message` says why.
+    #[default]
     Failed,
-    /// Stopped from outside.
+    /// The run was stopped before it was done.
     Interrupted,
 }
 
@@ -27,7 +28,7 @@ impl Status {
 }
 
 /// One image. Paths as the user would type them.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct ImageReport {
     pub input: String,
@@ -56,9 +57,11 @@ pub struct ImageReport {
     pub instances: Option<u64>,
     pub lights: Option<u64>,
     pub default_light: Option<DefaultLight>,
-    pub features: BTreeMap<&'static str, bool>,
+    pub features: BTreeMap<String, bool>,
     pub skipped: Vec<Skipped>,
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the file is not in the picture: `--strict` fails on them.
+    pub losses: Vec<String>,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
@@ -67,8 +70,23 @@ pub struct ImageReport {
     pub notes: Vec<String>,
 }
 
+impl ImageReport {
+    /// What `--strict` takes for a failure, although the image is none; empty for one that failed anyway.
+    pub fn strict_failures(&self) -> Vec<String> {
+        let mut failures = Vec::new();
+        if self.status == Status::Empty {
+            failures.push("the scene is empty".into());
+        }
+        if let Some(count) = self.non_finite_samples.filter(|count| *count > 0) {
+            failures.push(format!("{count} samples were not finite and were dropped"));
+        }
+        failures.extend(self.losses.iter().cloned());
+        failures
+    }
+}
+
 /// Files written; null where none was.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct Outputs {
     pub exr: Option<String>,
@@ -77,27 +95,27 @@ pub struct Outputs {
 }
 
 /// The ray backend; null where it was not chosen or has no such property.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct Accel {
-    pub requested: &'static str,
-    pub used: Option<&'static str>,
+    pub requested: String,
+    pub used: Option<String>,
     pub version: Option<String>,
     pub isa: Option<String>,
 }
 
 /// The built-in studio light and why it is on or off.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct DefaultLight {
-    pub requested: &'static str,
+    pub requested: String,
     pub used: bool,
     pub emitted_lm_per_m2: f64,
     pub glowing_share: f64,
 }
 
 /// Wall seconds of the image's own work; null where it did not come to that.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct Seconds {
     pub load: Option<f64>,
@@ -109,7 +127,7 @@ pub struct Seconds {
 }
 
 /// Rays traced.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct Rays {
     pub camera: u64,

@@ -1,53 +1,52 @@
-//! The engine: loads, renders and writes one image after the other, and goes on after a failure.
+//! The engine: one thread reads ahead, one renders (with a pool), one writes, and a failure stays with its image.
+//!
+//! The thread that calls [`run()`] plans, tells its [`Observer`] what the others report, and ends them when it is asked
+//! to. Images are finished in the order of the plan.
 
-use super::input::{Input, expand};
-use super::job::{CameraChoice, Naming, Plan, plan};
-use super::names::NameTemplate;
-use super::output::{WriteError, check_writable, write_atomic};
-use super::picture::{FileOptions, exr_bytes, png_bytes};
-use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Rays, Seconds, Status};
-use super::size::{PictureSize, aspect_note, check_crop, size_for};
-use super::view::CameraSource;
+use super::describe::{accel_name, blank};
+use super::input::Input;
+use super::job::{Plan, plan};
+use super::load_stage::LoadStage;
+use super::output::{WriteError, check_writable, sweep, write_atomic};
+use super::render_stage::RenderStage;
+use super::report::{self, Accel, BatchReport, Host, ImageReport, Status};
+use super::settings::{BatchSettings, FileSettings, Task};
+use super::size::{PictureSize, check_crop};
+use super::write_stage::WriteStage;
 use crate::camera::Camera;
-use crate::load::{LoadOptions, LoadTimes, load};
-use crate::render::{AccelChoice, DefaultLight, Frame, Progress, RenderSettings, render};
-use crate::scene::Scene;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use crate::render::{Progress, pool};
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::{Instant, SystemTime};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
 
-/// What to do.
-#[derive(Clone, Debug)]
-pub struct BatchSettings {
-    /// Files and folders as typed.
-    pub inputs: Vec<PathBuf>,
-    /// Where files go.
-    pub out: PathBuf,
-    /// Output names; `None` = the stem, with the camera where there are several.
-    pub name: Option<NameTemplate>,
-    /// Size of every picture.
-    pub size: PictureSize,
-    /// Where the cameras come from.
-    pub camera_source: CameraSource,
-    /// Which of them.
-    pub cameras: CameraChoice,
-    /// How files are read.
-    pub load: LoadOptions,
-    /// Everything else about the pictures; width and height are set from `size` for each.
-    pub render: RenderSettings,
-    /// What is written.
-    pub files: FileOptions,
-    /// The command line, for the report.
-    pub command: String,
+/// Told what happens, on the thread that called [`run()`].
+pub trait Observer {
+    /// The inputs are known, and as far as that can be told without loading them `images` will come of them.
+    fn planned(&mut self, _images: usize) {}
+    /// Work on an image starts; of several there may be one that is read, one that is rendered, one that is written.
+    fn started(&mut self, _image: &Started) {}
+    /// An image is done, its files are written.
+    fn finished(&mut self, _id: ImageId, _image: &ImageReport) {}
 }
 
-/// Told what happens, from the thread that called [`run()`].
-pub trait Observer {
-    /// An image of `input` starts; `progress` may be watched from another thread until [`Observer::finished`].
-    fn started(&mut self, _input: &Path, _progress: &Arc<Progress>) {}
-    /// An image is done, its files are written.
-    fn finished(&mut self, _image: &ImageReport) {}
+/// Tells the images of a run apart, in the order in which work on them starts.
+pub type ImageId = u64;
+
+/// An image that work starts on.
+#[derive(Clone, Debug)]
+pub struct Started {
+    /// To tell it from the others.
+    pub id: ImageId,
+    /// Its file.
+    pub input: PathBuf,
+    /// Its output path without extension, below the output folder.
+    pub output: PathBuf,
+    /// May be watched from any thread.
+    pub progress: Arc<Progress>,
 }
 
 /// Why nothing was rendered at all.
@@ -68,53 +67,161 @@ pub struct Outcome {
     pub bad_inputs: usize,
     /// An output that could not be written; the run stopped there.
     pub unwritable: Option<WriteError>,
+    /// The run was asked to end before everything was done.
+    pub interrupted: bool,
+    /// Images that `--strict` takes for failures although they were rendered, up to date or empty.
+    pub strict_failures: usize,
 }
 
 impl Outcome {
-    /// 0 all well, 1 some images failed, 3 every input was bad, 4 outputs cannot be written.
+    /// 0 all well, 1 some images failed, 3 every input was bad, 4 outputs cannot be written, 75 interrupted.
     pub fn exit_code(&self) -> u8 {
         let (all, failed) = (self.report.images.len(), self.report.counts[&Status::Failed]);
         match () {
+            () if self.interrupted => 75,
             () if self.unwritable.is_some() => 4,
             () if all > 0 && self.bad_inputs == all => 3,
-            () if failed > 0 => 1,
+            () if failed + self.strict_failures > 0 => 1,
             () => 0,
         }
     }
 }
 
-/// Renders everything that `settings` asks for.
+/// What the threads of a run share.
+pub(super) struct Shared {
+    pub settings: BatchSettings,
+    pub plan: Plan,
+    /// For each task the cameras that it is to be seen by, if not by its own.
+    pub elsewhere: Vec<Option<Arc<[Camera]>>>,
+    /// Ends what is under way.
+    pub stop: Arc<AtomicBool>,
+    /// For what goes on beside rendering, whose own pool is busy.
+    pub beside: rayon::ThreadPool,
+    next_id: AtomicU64,
+    gate: Mutex<Gate>,
+}
+
+/// Between rendering and writing, so that a run can end while another thread is still at work on something that nobody
+/// waits for any more.
+#[derive(Default)]
+struct Gate {
+    is_closed: bool,
+    /// Images handed to the writer and not yet finished.
+    writing: usize,
+}
+
+impl Shared {
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Starts an image.
+    pub fn start(&self, events: &Sender<Event>, task: usize, output: &Path) -> (ImageId, Arc<Progress>) {
+        let id = self.next_id.fetch_add(1, Ordering::Relaxed);
+        let progress = Arc::new(Progress::cancelled_by(Arc::clone(&self.stop)));
+        let input = self.settings.tasks[task].input.path.clone();
+        // Nobody listens any more when the run was ended; then nobody misses it.
+        let _ = events.send(Event::Started(Started {
+            id,
+            input,
+            output: output.to_owned(),
+            progress: Arc::clone(&progress),
+        }));
+        (id, progress)
+    }
+
+    fn gate(&self) -> MutexGuard<'_, Gate> {
+        self.gate.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether an image may still be handed to the writer.
+    pub fn opens_to_writer(&self) -> bool {
+        let mut gate = self.gate();
+        gate.writing += usize::from(!gate.is_closed);
+        !gate.is_closed
+    }
+
+    /// The writer is done with an image.
+    pub fn written(&self) {
+        self.gate().writing -= 1;
+    }
+}
+
+/// What the threads tell the one that called [`run()`].
+pub(super) enum Event {
+    Started(Started),
+    Finished { id: ImageId, task: usize, image: Box<ImageReport>, is_bad_input: bool },
+    Unwritable(WriteError),
+}
+
+/// How often the run asks whether it is to end.
+const POLL: Duration = Duration::from_millis(20);
+
+/// How long a thread that was told to end is waited for: tracing ends within a wave, but reading a file or building a
+/// tree has no place to stop at.
+const GRACE: Duration = Duration::from_millis(200);
+
+/// Stack of the threads that read, render and write: what a main thread has.
+const STACK: usize = 8 << 20;
+
+/// Renders everything that `settings` asks for. Ends soon after `settings.cancel` is set: finished images are written,
+/// the one under way is dropped. A thread that is reading or building then may go on for a while, to no effect.
 ///
 /// # Errors
-/// Nothing was rendered, because names clash, a crop does not fit, the cameras from elsewhere are not to be had, or the
-/// output folder cannot be written to.
-pub fn run(settings: &BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
+/// Nothing was rendered, because names clash, a crop does not fit, the cameras from elsewhere are not to be had, the
+/// output folder cannot be written to, or the threads are not to be had.
+///
+/// # Panics
+/// When one of the run's own threads does, which is a bug.
+pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
-        check_crop(crop, width, height).map_err(Stop::Usage)?;
-    }
-    let inputs = expand(&settings.inputs);
-    let scene = settings.load.scene.as_deref();
-    let elsewhere = settings.camera_source.cameras().map_err(Stop::Usage)?;
-    let names = elsewhere.as_deref().map(names_of);
-    if let Some(names) = &names {
-        // What is not there is there for no input.
-        let source = settings.camera_source.options();
-        settings.cameras.select(names).map_err(|error| Stop::Usage(format!("{source}: {error}")))?;
-    }
-    let plan =
-        plan(&inputs, settings.name.as_ref(), &settings.cameras, scene, names.as_deref()).map_err(Stop::Usage)?;
-    check_writable(&settings.out).map_err(Stop::Unwritable)?;
-
-    let mut run = Run { settings, observer, plan, elsewhere, images: Vec::new(), bad_inputs: 0, unwritable: None };
-    for (index, input) in inputs.iter().enumerate() {
-        run.input(index, input);
-        if run.unwritable.is_some() {
-            break;
+    let elsewhere = cameras_from_elsewhere(&settings.tasks).map_err(Stop::Usage)?;
+    for Task { settings, .. } in &settings.tasks {
+        if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
+            check_crop(crop, width, height).map_err(Stop::Usage)?;
         }
     }
-    let Run { images, bad_inputs, mut unwritable, .. } = run;
-    let requested = Accel { requested: accel_name(settings.render.accel), ..Accel::default() };
+    let names: Vec<_> = elsewhere.iter().map(|cameras| cameras.as_deref().map(names_of)).collect();
+    let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
+    let threads = |error: crate::error::RenderError| Stop::Usage(format!("--threads: {error}"));
+    let (rendering, beside) = (pool(settings.threads).map_err(threads)?, pool(settings.threads).map_err(threads)?);
+    check_writable(&settings.out).map_err(Stop::Unwritable)?;
+    let folders: HashSet<&Path> = plan.owners.keys().filter_map(|output| output.parent()).collect();
+    folders.into_iter().for_each(|folder| sweep(&settings.out.join(folder)));
+
+    let jobs = jobs(&settings.tasks, &plan);
+    observer.planned(jobs.iter().map(Vec::len).sum());
+    let shared = Arc::new(Shared {
+        settings,
+        plan,
+        elsewhere,
+        stop: Arc::default(),
+        beside,
+        next_id: AtomicU64::new(0),
+        gate: Mutex::default(),
+    });
+    let (events, threads) = start_threads(&shared, rendering);
+    let Conducted { mut images, bad_inputs, mut unwritable, is_abandoned } = conduct(&shared, &events, observer);
+    if !is_abandoned {
+        for thread in threads {
+            if let Err(panic) = thread.join() {
+                std::panic::resume_unwind(panic);
+            }
+        }
+    }
+
+    let settings = &shared.settings;
+    let before = images.len();
+    if shared.is_stopped() {
+        for (task, jobs) in jobs.iter().enumerate() {
+            let done = images.iter().filter(|(t, _)| *t == task).count();
+            images.extend(jobs.iter().skip(done).map(|camera| (task, left_out(&settings.tasks[task], camera.clone()))));
+        }
+    }
+    let interrupted = images.len() > before && settings.cancel.load(Ordering::Relaxed);
+    let images: Vec<ImageReport> = images.into_iter().map(|(_, image)| image).collect();
+    let requested = settings.tasks.first().map_or_else(Default::default, |task| task.settings.render.accel);
+    let requested = Accel { requested: accel_name(requested).into(), ..Accel::default() };
     let chosen = images.iter().map(|image| &image.accel).find(|accel| accel.used.is_some());
     let count = |status| images.iter().filter(|image| image.status == status).count();
     let report = BatchReport {
@@ -122,7 +229,7 @@ pub fn run(settings: &BatchSettings, observer: &mut dyn Observer) -> Result<Outc
         command: settings.command.clone(),
         started: report::utc(started),
         seconds: clock.elapsed().as_secs_f64(),
-        host: Host { cpu: report::cpu_name(), threads: threads(&settings.render) },
+        host: Host { cpu: report::cpu_name(), threads: shared.beside.current_num_threads() },
         accel: chosen.cloned().unwrap_or(requested),
         counts: Status::ALL.iter().map(|&status| (status, count(status))).collect(),
         images,
@@ -130,288 +237,134 @@ pub fn run(settings: &BatchSettings, observer: &mut dyn Observer) -> Result<Outc
     if let Err(error) = write_atomic(&settings.out.join("batch.json"), report::to_json(&report).as_bytes()) {
         unwritable.get_or_insert(error);
     }
-    Ok(Outcome { report, bad_inputs, unwritable })
+    let strict = report.images.iter().filter(|image| !image.strict_failures().is_empty());
+    let strict_failures = if settings.strict { strict.count() } else { 0 };
+    Ok(Outcome { report, bad_inputs, unwritable, interrupted, strict_failures })
 }
 
-/// One run under way.
-struct Run<'a> {
-    settings: &'a BatchSettings,
-    observer: &'a mut dyn Observer,
-    plan: Plan,
-    /// The cameras for every input, if the inputs' own are not wanted.
-    elsewhere: Option<Vec<Camera>>,
-    images: Vec<ImageReport>,
-    bad_inputs: usize,
-    unwritable: Option<WriteError>,
+/// The cameras that each task is to be seen by, if not by its own; read once for all tasks that share settings.
+pub(super) fn cameras_from_elsewhere(tasks: &[Task]) -> Result<Vec<Option<Arc<[Camera]>>>, String> {
+    let mut known: HashMap<*const FileSettings, Option<Arc<[Camera]>>> = HashMap::new();
+    tasks
+        .iter()
+        .map(|Task { settings, .. }| {
+            if let Some(cameras) = known.get(&Arc::as_ptr(settings)) {
+                return Ok(cameras.clone());
+            }
+            let cameras: Option<Arc<[Camera]>> = settings.camera_source.cameras()?.map(Into::into);
+            if let Some(cameras) = &cameras {
+                // What is not there is there for no input.
+                let source = settings.camera_source.options();
+                settings.cameras.select(&names_of(cameras)).map_err(|error| format!("{source}: {error}"))?;
+            }
+            known.insert(Arc::as_ptr(settings), cameras.clone());
+            Ok(cameras)
+        })
+        .collect()
 }
 
-impl Run<'_> {
-    /// All images of one input.
-    fn input(&mut self, index: usize, input: &Input) {
-        let clock = Instant::now();
-        let progress = Arc::new(Progress::default());
-        self.observer.started(&input.path, &progress);
-        let naming = self.plan.namings[index].clone();
-        let mut image = self.blank(&input.path);
-        let loaded = match &input.problem {
-            Some(problem) => Err(problem.to_string()),
-            None => guarded(|| load(&input.path, &self.settings.load).map_err(|error| error.to_string())),
-        };
-        let loaded = loaded.and_then(|(mut scene, times)| {
-            if let Some(cameras) = &self.elsewhere {
-                self.settings.camera_source.replace(&mut scene, cameras);
-            }
-            let names = names_of(&scene.cameras);
-            let chosen = self.settings.cameras.select(&names);
-            let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;
-            Ok((scene, times, names, chosen))
-        });
-        let (scene, times, names, chosen) = match loaded {
-            Ok(loaded) => loaded,
-            Err(message) => {
-                self.bad_inputs += 1;
-                fail(&mut image, message);
-                image.seconds.total = clock.elapsed().as_secs_f64();
-                // A pattern or a folder has no name of its own to write under.
-                let output = input.problem.is_none().then(|| naming.output("0", false));
-                return self.finish(image, output);
-            }
-        };
-        self.scene(index, &input.path, &scene, times, (&naming, &names, &chosen), (clock, progress));
-    }
-
-    /// All chosen images of a loaded scene.
-    fn scene(
-        &mut self,
-        index: usize,
-        path: &Path,
-        scene: &Scene,
-        times: LoadTimes,
-        (naming, names, chosen): (&Naming, &[String], &[usize]),
-        (mut clock, mut progress): (Instant, Arc<Progress>),
-    ) {
-        let outputs = naming.outputs(names, chosen);
-        for (nth, (&camera, output)) in chosen.iter().zip(outputs).enumerate() {
-            let mut image = self.blank(path);
-            if nth == 0 {
-                (image.seconds.load, image.seconds.decode) = (Some(times.load), Some(times.decode));
-            } else {
-                // The file was read for the first image already.
-                (image.seconds.load, image.seconds.decode) = (Some(0.0), Some(0.0));
-                (clock, progress) = (Instant::now(), Arc::default());
-                self.observer.started(path, &progress);
-            }
-            image.scene = Some(scene.index);
-            let name = |name: &String| if name.is_empty() { camera.to_string() } else { name.clone() };
-            image.camera = names.get(camera).map(name);
-            image.warnings.clone_from(&scene.warnings);
-            image.skipped.clone_from(&scene.skipped);
-            let owner = *self.plan.owners.entry(output.clone()).or_insert(index);
-            if owner != index {
-                fail(
-                    &mut image,
-                    format!("{}: {} belongs to another input; use --name", path.display(), output.display()),
-                );
-                self.finish(image, None);
-                continue;
-            }
-            self.image(scene, camera, &output, &progress, &mut image);
-            image.seconds.total = clock.elapsed().as_secs_f64();
-            self.finish(image, Some(output));
-            if self.unwritable.is_some() {
-                return;
-            }
-        }
-    }
-
-    /// Renders one image and writes its pictures.
-    fn image(&mut self, scene: &Scene, camera: usize, output: &Path, progress: &Progress, image: &mut ImageReport) {
-        if scene.triangle_count() == 0 {
-            image.status = Status::Empty;
-            image.warnings.push("nothing drawable: the scene has no triangles; no picture was written".into());
-            return;
-        }
-        let mut settings = self.settings.render.clone();
-        (settings.width, settings.height) = size_for(self.settings.size, scene, camera);
-        (image.width, image.height) = (Some(settings.width), Some(settings.height));
-        image.notes.extend(aspect_note(self.settings.size, scene, camera));
-        let fitting = settings.crop.map_or(Ok(()), |crop| check_crop(crop, settings.width, settings.height));
-        let rendered = fitting
-            .and_then(|()| guarded(|| render(scene, camera, &settings, progress).map_err(|error| error.to_string())));
-        match rendered {
-            Ok(frame) => {
-                describe(&frame, &settings, image);
-                self.write_pictures(&frame, &settings, output, image);
-            }
-            Err(message) => fail(image, format!("{}: {message}", image.input)),
-        }
-    }
-
-    /// Writes EXR, then PNG.
-    fn write_pictures(&mut self, frame: &Frame, settings: &RenderSettings, output: &Path, image: &mut ImageReport) {
-        let (clock, files) = (Instant::now(), self.settings.files);
-        if files.exr {
-            match exr_bytes(frame, settings, files.compression) {
-                Ok(bytes) => image.outputs.exr = self.write(output, "exr", &bytes),
-                Err(error) => return fail(image, format!("{}: {error}", image.input)),
-            }
-        }
-        if files.png && self.unwritable.is_none() {
-            let (bytes, nan_channels) = png_bytes(frame, &files.tone);
-            if nan_channels > 0 {
-                image.warnings.push(format!("{nan_channels} channels of the picture are NaN; the PNG shows them as 0"));
-            }
-            image.outputs.png = self.write(output, "png", &bytes);
-        }
-        image.seconds.write = Some(clock.elapsed().as_secs_f64());
-        match &self.unwritable {
-            Some(error) => fail(image, error.to_string()),
-            None => image.status = Status::Rendered,
-        }
-    }
-
-    /// Writes `<out>/<output>.<extension>`; the path if that went well, else the run is to stop.
-    fn write(&mut self, output: &Path, extension: &str, bytes: &[u8]) -> Option<String> {
-        let path = self.path(output, extension);
-        match write_atomic(&path, bytes) {
-            Ok(()) => Some(path.display().to_string()),
-            Err(error) => {
-                self.unwritable = Some(error);
-                None
-            }
-        }
-    }
-
-    fn path(&self, output: &Path, extension: &str) -> PathBuf {
-        let mut name = self.settings.out.join(output).into_os_string();
-        name.push(".");
-        name.push(extension);
-        name.into()
-    }
-
-    /// Writes the image's JSON and files it.
-    fn finish(&mut self, mut image: ImageReport, output: Option<PathBuf>) {
-        image.peak_rss_bytes = report::peak_rss_bytes();
-        if let (Some(output), None) = (output, &self.unwritable) {
-            image.outputs.json = Some(self.path(&output, "json").display().to_string());
-            if self.write(&output, "json", report::to_json(&image).as_bytes()).is_none() {
-                image.outputs.json = None;
-                let error = self.unwritable.as_ref().map(ToString::to_string);
-                fail(&mut image, error.unwrap_or_default());
-            }
-        }
-        self.observer.finished(&image);
-        self.images.push(image);
-    }
-
-    /// The report of an image of which nothing is known yet.
-    fn blank(&self, input: &Path) -> ImageReport {
-        let render = &self.settings.render;
-        ImageReport {
-            input: input.display().to_string(),
-            scene: None,
-            camera: None,
-            frame: None,
-            status: Status::Failed,
-            error_message: None,
-            outputs: Outputs::default(),
-            width: None,
-            height: None,
-            spp: render.spp,
-            seed: render.seed,
-            accel: Accel { requested: accel_name(render.accel), ..Accel::default() },
-            seconds: Seconds::default(),
-            rays: None,
-            mrays_per_s: None,
-            estimated_error: None,
-            non_finite_samples: None,
-            truncated: None,
-            energy_clamped: None,
-            peak_rss_bytes: None,
-            triangles: None,
-            instances: None,
-            lights: None,
-            default_light: None,
-            features: Default::default(),
-            skipped: Vec::new(),
-            warnings: Vec::new(),
-            accel_note: String::new(),
-            notes: Vec::new(),
-        }
-    }
+/// For each task the images that will come of it, as far as that is known, by their cameras' names in reports.
+fn jobs(tasks: &[Task], plan: &Plan) -> Vec<Vec<Option<String>>> {
+    let of = |(task, names): (&Task, &Vec<String>)| {
+        let chosen = task.settings.cameras.select(names).unwrap_or_else(|_| vec![0]);
+        chosen.into_iter().map(|camera| reported_name(names, camera)).collect()
+    };
+    tasks.iter().zip(&plan.cameras).map(of).collect()
 }
 
-fn names_of(cameras: &[Camera]) -> Vec<String> {
+/// The report of an image that was not done because the run ended.
+fn left_out(Task { input: Input { path, .. }, settings }: &Task, camera: Option<String>) -> ImageReport {
+    ImageReport { status: Status::Interrupted, camera, ..blank(path, settings) }
+}
+
+/// The camera's name as reports have it: its index where it has none, `None` for the one framed on the bounds.
+pub(super) fn reported_name(names: &[String], camera: usize) -> Option<String> {
+    names.get(camera).map(|name| if name.is_empty() { camera.to_string() } else { name.clone() })
+}
+
+pub(super) fn names_of(cameras: &[Camera]) -> Vec<String> {
     cameras.iter().map(|camera| camera.name.clone()).collect()
 }
 
-fn fail(image: &mut ImageReport, message: String) {
-    image.status = Status::Failed;
-    image.error_message = Some(message);
+/// Starts the threads; each ends when the one before it has.
+fn start_threads(shared: &Arc<Shared>, rendering: rayon::ThreadPool) -> (Receiver<Event>, Vec<JoinHandle<()>>) {
+    let (events, received) = channel();
+    // Nothing is kept between reading and rendering: one scene is rendered, one waits. A picture that is being written
+    // may be followed by one that waits.
+    let (to_render, loaded) = sync_channel(0);
+    let (to_write, made) = sync_channel(1);
+    let load = LoadStage { shared: Arc::clone(shared), events: events.clone() };
+    let render = RenderStage { shared: Arc::clone(shared), events: events.clone(), pool: rendering };
+    let write = WriteStage { shared: Arc::clone(shared), events };
+    let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
+        let thread = std::thread::Builder::new().name(name.into()).stack_size(STACK);
+        thread.spawn(work).expect("the system gives three threads")
+    };
+    let threads = vec![
+        spawn("load", Box::new(move || load.run(&to_render))),
+        spawn("render", Box::new(move || render.run(&loaded, &to_write))),
+        spawn("write", Box::new(move || write.run(&made))),
+    ];
+    (received, threads)
 }
 
-/// Runs `work`; a panic in it becomes an error, so that the batch goes on.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-        Err(format!("internal error: {text}\n  This is a bug in prt-batch, please report it with the file."))
-    })
+/// What came of the images.
+#[derive(Default)]
+struct Conducted {
+    /// Each with its task.
+    images: Vec<(usize, ImageReport)>,
+    bad_inputs: usize,
+    unwritable: Option<WriteError>,
+    /// Threads are still at work, on nothing that matters.
+    is_abandoned: bool,
 }
 
-/// Puts what `frame` says about itself into the report.
-fn describe(frame: &Frame, settings: &RenderSettings, image: &mut ImageReport) {
-    let stats = &frame.stats;
-    let total = stats.camera_rays + stats.bounce_rays + stats.shadow_rays;
-    let some = |text: &String| (!text.is_empty()).then(|| text.clone());
-    image.spp = frame.spp;
-    image.accel.used = Some(stats.accel.used);
-    (image.accel.version, image.accel.isa) = (some(&stats.accel.version), some(&stats.accel.isa));
-    image.accel_note.clone_from(&stats.accel.note);
-    (image.seconds.build, image.seconds.render) = (Some(stats.build_seconds), Some(stats.render_seconds));
-    let (camera, bounce, shadow) = (stats.camera_rays, stats.bounce_rays, stats.shadow_rays);
-    image.rays = Some(Rays { camera, bounce, shadow, total });
-    image.mrays_per_s = (stats.render_seconds > 0.0).then(|| total as f64 / stats.render_seconds * 1e-6);
-    image.non_finite_samples = Some(stats.non_finite_samples);
-    image.truncated = Some(stats.truncated);
-    image.triangles = Some(stats.triangles);
-    image.instances = Some(stats.instances);
-    image.lights = Some(stats.lights);
-    image.default_light = Some(report::DefaultLight {
-        requested: default_light_name(stats.default_light.requested),
-        used: stats.default_light.used,
-        emitted_lm_per_m2: stats.default_light.emitted.by_lamps,
-        glowing_share: stats.default_light.emitted.glowing,
-    });
-    image.notes.extend(stats.default_light.note());
-    image.features = stats.features.iter().copied().collect();
-    image.warnings.extend(stats.warnings.iter().cloned());
-    if let Some((x, y, sample)) = stats.non_finite_examples.first() {
-        let (count, seed) = (stats.non_finite_samples, settings.seed);
-        let first = format!("the first at pixel ({x}, {y}), sample {sample}, seed {seed}");
-        image.warnings.push(format!("{count} samples were not finite and were dropped; {first}"));
+/// Passes on what the threads report until they are done or the run is to end.
+fn conduct(shared: &Shared, events: &Receiver<Event>, observer: &mut dyn Observer) -> Conducted {
+    let mut conducted = Conducted::default();
+    let mut stopped_at = None;
+    loop {
+        let event = events.recv_timeout(POLL);
+        if shared.settings.cancel.load(Ordering::Relaxed) {
+            shared.stop.store(true, Ordering::Relaxed);
+        }
+        match event {
+            Ok(event) => conducted.take(event, observer),
+            Err(RecvTimeoutError::Disconnected) => return conducted,
+            Err(RecvTimeoutError::Timeout) if shared.is_stopped() => {
+                let since = stopped_at.get_or_insert_with(Instant::now);
+                if since.elapsed() > GRACE && conducted.closes(shared) {
+                    events.try_iter().for_each(|event| conducted.take(event, observer));
+                    return conducted;
+                }
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
     }
 }
 
-fn accel_name(accel: AccelChoice) -> &'static str {
-    match accel {
-        AccelChoice::Auto => "auto",
-        AccelChoice::Embree => "embree",
-        AccelChoice::Bvh => "bvh",
-        AccelChoice::Linear => "linear",
+impl Conducted {
+    fn take(&mut self, event: Event, observer: &mut dyn Observer) {
+        match event {
+            Event::Started(image) => observer.started(&image),
+            Event::Finished { id, task, image, is_bad_input } => {
+                observer.finished(id, &image);
+                self.bad_inputs += usize::from(is_bad_input);
+                self.images.push((task, *image));
+            }
+            Event::Unwritable(error) => {
+                self.unwritable.get_or_insert(error);
+            }
+        }
     }
-}
 
-fn default_light_name(choice: DefaultLight) -> &'static str {
-    match choice {
-        DefaultLight::Auto => "auto",
-        DefaultLight::On => "on",
-        DefaultLight::Off => "off",
+    /// Whether nothing is left to be written; then nothing will be.
+    fn closes(&mut self, shared: &Shared) -> bool {
+        let mut gate = shared.gate();
+        gate.is_closed = gate.writing == 0;
+        self.is_abandoned = gate.is_closed;
+        gate.is_closed
     }
-}
-
-fn threads(settings: &RenderSettings) -> usize {
-    settings.threads.or_else(|| std::thread::available_parallelism().ok().map(Into::into)).unwrap_or(1)
 }
 
 #[cfg(test)]

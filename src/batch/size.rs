@@ -13,6 +13,17 @@ pub enum PictureSize {
     Exact(u32, u32),
 }
 
+impl Default for PictureSize {
+    fn default() -> Self {
+        Self::Width(Self::DEFAULT_WIDTH)
+    }
+}
+
+impl PictureSize {
+    /// Pixels across when nobody says it.
+    pub const DEFAULT_WIDTH: u32 = 1280;
+}
+
 /// The aspect ratio that `camera` gives, if it gives one.
 fn aspect_ratio(scene: &Scene, camera: usize) -> Option<f64> {
     scene.cameras.get(camera).and_then(|camera| match camera.projection {

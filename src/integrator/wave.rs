@@ -15,6 +15,8 @@ pub trait SampleSink {
     fn add(&mut self, pixel: u32, radiance: [f32; 3]);
     /// A sample that was dropped because a channel was not finite.
     fn drop_non_finite(&mut self, pixel: u32, sample: u32);
+    /// Asked once a wave, after its samples were received: false ends the unit where it is, incomplete.
+    fn goes_on(&mut self, counters: &Counters) -> bool;
 }
 
 /// A rectangle of pixels and a range of samples: what one worker traces on its own.
@@ -45,6 +47,13 @@ pub struct Counters {
     pub truncated: u64,
 }
 
+impl Counters {
+    /// All rays.
+    pub fn total(&self) -> u64 {
+        self.camera + self.bounce + self.shadow
+    }
+}
+
 /// One thread's state.
 pub struct Worker {
     pool: PathPool,
@@ -59,7 +68,7 @@ impl Default for Worker {
 }
 
 impl PathTracer<'_> {
-    /// Traces all samples of `unit` into `sink`. The result depends on the unit alone: not on the worker, nor on what
+    /// Traces all samples of `unit` into `sink`, unless that ends it. The result depends on the unit alone: not on the worker, nor on what
     /// it did before.
     pub fn trace(&self, unit: &Unit, worker: &mut Worker, sink: &mut impl SampleSink) {
         let Worker { pool, counters } = worker;
@@ -95,6 +104,10 @@ impl PathTracer<'_> {
                 pool.free.push(slot);
             }
             pool.n_dead = 0;
+            if !sink.goes_on(counters) {
+                *pool = PathPool::new();
+                return;
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::texture::Channels;
 use std::path::Path;
 
 /// What reading an input will take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoadEstimate {
     /// Bytes at most at any time while it is read, its scene included.
     pub bytes: u64,

@@ -2,19 +2,28 @@
 
 use super::features::features;
 use super::prepare::prepare;
-use super::tracer::{self, on_threads};
-use super::{Frame, FrameCamera, Progress, RenderSettings, RenderStats, schedule};
+use super::{Frame, FrameCamera, Phase, Progress, RenderSettings, RenderStats, schedule, tracer};
 use crate::error::RenderError;
 use crate::film::{Film, Tile};
 use crate::scene::Scene;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-/// Renders camera `camera` of `scene` (an index into `scene.cameras`; a scene without cameras has one framed on its
-/// bounds, index 0).
+/// A rayon pool of `threads` threads (`None` = the cores this process may use) in which to [`render`].
 ///
 /// # Errors
-/// The backend is not to be had, the scene is too large, or `progress.cancel` was set.
+/// The system does not give that many threads.
+pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, RenderError> {
+    let threads = threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("render {i}")).build();
+    pool.map_err(|e| RenderError::TooLarge(format!("cannot start {threads} threads: {e}")))
+}
+
+/// Renders camera `camera` of `scene` (an index into `scene.cameras`; a scene without cameras has one framed on its
+/// bounds, index 0), on the current rayon pool or, if the settings give a number of threads, on one of its own.
+///
+/// # Errors
+/// The backend is not to be had, the scene is too large, or `progress` was cancelled.
 ///
 /// # Panics
 /// When `camera` is out of range, or the settings are (sizes, samples and lanes are checked by whoever made them).
@@ -24,7 +33,10 @@ pub fn render(
     settings: &RenderSettings,
     progress: &Progress,
 ) -> Result<Frame, RenderError> {
-    on_threads(settings, || render_here(scene, camera, settings, progress))
+    match settings.threads {
+        None => render_here(scene, camera, settings, progress),
+        threads => pool(threads)?.install(|| render_here(scene, camera, settings, progress)),
+    }
 }
 
 /// [`render`] on the current rayon pool.
@@ -36,9 +48,13 @@ fn render_here(
 ) -> Result<Frame, RenderError> {
     let (width, height) = (settings.width, settings.height);
     assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
+    progress.enter(Phase::Building);
     let start = Instant::now();
     let prepared = prepare(scene, settings)?;
     let build_seconds = start.elapsed().as_secs_f64();
+    if progress.is_cancelled() {
+        return Err(RenderError::Interrupted);
+    }
 
     let camera = tracer::camera(scene, camera, &prepared, settings);
     let window = tracer::window(settings);
@@ -46,9 +62,10 @@ fn render_here(
     let tracer = tracer::tracer(&prepared, &camera, settings);
     let paths = u64::from(window.width) * u64::from(window.height) * u64::from(settings.spp);
     progress.total.store(paths, Ordering::Relaxed);
+    progress.enter(Phase::Rendering);
     let start = Instant::now();
     let totals = schedule::trace(&tracer, &film, progress);
-    if progress.cancel.load(Ordering::Relaxed) {
+    if progress.is_cancelled() {
         return Err(RenderError::Interrupted);
     }
     let pixels = film.mean();
@@ -83,6 +100,7 @@ fn render_here(
         accel: prepared.accel_report,
         lanes,
         warnings,
+        losses: prepared.losses,
     };
     let frame_camera = FrameCamera {
         world_from_camera: camera.world_from_camera,

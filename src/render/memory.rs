@@ -35,11 +35,14 @@ pub struct MemoryEstimate {
 }
 
 impl MemoryEstimate {
+    /// At most while the picture is made, beyond its scene.
+    pub fn rendering(&self) -> u64 {
+        self.prepared.saturating_add(self.building.max(self.film).max(self.files))
+    }
+
     /// At most at any time.
     pub fn peak(&self) -> u64 {
-        let passing = self.building.max(self.film).max(self.files);
-        let parts = [self.left_over, self.scene, self.prepared, passing];
-        let rendering = parts.into_iter().fold(0, u64::saturating_add);
+        let rendering = self.left_over.saturating_add(self.scene).saturating_add(self.rendering());
         self.program.saturating_add(rendering.max(self.loading))
     }
 
@@ -81,7 +84,8 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     // Four f32 a block, and 3 f32 of the mean; a hundredth for what the allocator needs.
     let film = pixels.saturating_mul(16 * u64::from(BLOCKS.min(settings.spp)) + 12);
     let film = film.saturating_add(film / 100);
-    let embree = if settings.accel == AccelChoice::Auto || settings.accel == AccelChoice::Embree { EMBREE_LIBRARY } else { 0 };
+    let embree =
+        if settings.accel == AccelChoice::Auto || settings.accel == AccelChoice::Embree { EMBREE_LIBRARY } else { 0 };
     // 3 f32 a pixel; EXR: 4 f32 a pixel; PNG: 3 bytes a pixel and, compressed, no more again.
     let files = 12 + if files.exr { 16 } else { 0 } + if files.png { 6 } else { 0 };
     MemoryEstimate {
@@ -154,9 +158,8 @@ const ENVIRONMENT_TEXEL: u64 = 16 + 4;
 
 impl Machinery {
     fn of(scene: &Scene, settings: &RenderSettings) -> Self {
-        let emits: Vec<bool> = (scene.materials.iter())
-            .map(|m| !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0))
-            .collect();
+        let emits: Vec<bool> =
+            (scene.materials.iter()).map(|m| !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0)).collect();
         let (mut vertices, mut triangles, mut lights, mut records, mut largest) = (0_u64, 0_u64, 0_u64, 0_u64, 0_u64);
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh.index()];

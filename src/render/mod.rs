@@ -8,33 +8,20 @@ mod framing;
 pub mod memory;
 mod pilot;
 mod prepare;
+mod progress;
 mod schedule;
 mod settings;
 mod tracer;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use features::features;
-pub use frame::render;
+pub use frame::{pool, render};
 pub use framing::FRAMING_YFOV;
 pub use pilot::{Pilot, pilot};
 pub use prepare::{Prepared, prepare};
+pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
-pub use tracer::{camera, on_threads, window};
-
-use std::sync::atomic::{AtomicBool, AtomicU64};
-
-/// Watched and steered from another thread while a frame renders.
-#[derive(Debug, Default)]
-pub struct Progress {
-    /// Camera samples finished.
-    pub done: AtomicU64,
-    /// Camera samples to do in all; 0 until known.
-    pub total: AtomicU64,
-    /// Rays traced so far.
-    pub rays: AtomicU64,
-    /// Set it and the render ends soon with [`crate::error::RenderError::Interrupted`].
-    pub cancel: AtomicBool,
-}
+pub use tracer::{camera, window};
 
 /// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
 #[derive(Clone, Copy, Debug)]
@@ -99,6 +86,8 @@ pub struct RenderStats {
     pub lanes: u32,
     /// Said to the user and written into the JSON.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the scene is not in the picture.
+    pub losses: Vec<String>,
 }
 
 /// A rendered picture. `pixels` covers `window` only, row by row from the top.

@@ -4,7 +4,7 @@ use super::tracer::{tracer, window};
 use super::{CropWindow, Prepared, RenderSettings};
 use crate::camera::Camera;
 use crate::film::{BLOCKS, TILE};
-use crate::integrator::{SampleSink, Unit, Worker};
+use crate::integrator::{Counters, SampleSink, Unit, Worker};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -40,6 +40,10 @@ impl SampleSink for Nowhere {
     fn add(&mut self, _pixel: u32, _radiance: [f32; 3]) {}
 
     fn drop_non_finite(&mut self, _pixel: u32, _sample: u32) {}
+
+    fn goes_on(&mut self, _counters: &Counters) -> bool {
+        true
+    }
 }
 
 /// Traces paths of the picture of `camera` for about a tenth of a second on the threads of the current rayon pool.

@@ -35,6 +35,8 @@ pub struct Prepared {
     pub default_light: DefaultLightReport,
     /// Said to the user.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the scene is not in the picture.
+    pub losses: Vec<String>,
 }
 
 /// What is counted while instances are flattened.
@@ -75,7 +77,7 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     for instance in &scene.instances {
         flatten(scene, instance, origin, &emissions, &mut geometry, &mut triangles, &mut lights, &mut totals);
     }
-    let mut warnings = Vec::new();
+    let (mut warnings, mut losses) = (Vec::new(), Vec::new());
     if totals.without_area > 0 {
         warnings.push(format!("{} triangles have no area once placed and were dropped", totals.without_area));
     }
@@ -88,8 +90,9 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     }
     if totals.too_far > 0 {
         let count = totals.too_far;
-        warnings.push(format!("{count} triangles are not finite or beyond 1.844e18 once placed and were dropped"));
+        losses.push(format!("{count} triangles are not finite or beyond 1.844e18 once placed and were dropped"));
     }
+    warnings.extend(losses.iter().cloned());
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
     punctual(scene, origin, radius, &mut lights);
     let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
@@ -100,7 +103,7 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     let lights = LightTable::new(&lights, environment, &mut triangles);
     let (accel, accel_report) = build_accel(geometry, settings)?;
     let tables = SceneTables { triangles, materials, textures, lights };
-    Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings })
+    Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings, losses })
 }
 
 /// Most that the environment takes of the light samples where there are other lights: scattered rays find it by

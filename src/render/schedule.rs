@@ -23,7 +23,12 @@ pub struct Totals {
 /// Adds a unit's samples to its tile's sums.
 struct Sink<'a> {
     unit: &'a Unit,
+    progress: &'a Progress,
     sums: TileSums,
+    /// Finished since the last wave.
+    finished: u64,
+    /// Rays at the last wave.
+    rays: u64,
     non_finite: u64,
     examples: Vec<(u32, u32, u32)>,
 }
@@ -32,18 +37,30 @@ impl SampleSink for Sink<'_> {
     #[inline]
     fn add(&mut self, pixel: u32, radiance: [f32; 3]) {
         self.sums.add(pixel, radiance);
+        self.finished += 1;
     }
 
     #[cold]
     fn drop_non_finite(&mut self, pixel: u32, sample: u32) {
         self.non_finite += 1;
+        self.finished += 1;
         if self.examples.len() < EXAMPLES {
             self.examples.push((self.unit.x + pixel % self.unit.width, self.unit.y + pixel / self.unit.width, sample));
         }
     }
+
+    #[inline]
+    fn goes_on(&mut self, counters: &Counters) -> bool {
+        let rays = counters.total();
+        self.progress.rays.fetch_add(rays - self.rays, Ordering::Relaxed);
+        self.progress.done.fetch_add(std::mem::take(&mut self.finished), Ordering::Relaxed);
+        self.rays = rays;
+        !self.progress.is_cancelled()
+    }
 }
 
-/// Traces every unit of `film` on the threads of the current rayon pool. Ends early when `progress.cancel` is set.
+/// Traces every unit of `film` on the threads of the current rayon pool. Ends early, with units missing, when
+/// `progress` is cancelled: a wave takes about a millisecond.
 pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Totals {
     let next = AtomicUsize::new(0);
     let found = Mutex::new((Totals::default(), Vec::new()));
@@ -51,24 +68,29 @@ pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Total
         let mut worker = Worker::default();
         let mut non_finite = 0;
         let mut examples = Vec::new();
-        let mut rays_before = 0;
-        while !progress.cancel.load(Ordering::Relaxed) {
+        while !progress.is_cancelled() {
             let i = next.fetch_add(1, Ordering::Relaxed);
             if i >= film.units() {
                 break;
             }
             let (tile, samples) = film.unit(i);
-            let paths = tile.area() as u64 * u64::from(samples.end - samples.start);
             let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples };
-            let mut sink = Sink { unit: &unit, sums: TileSums::new(&tile), non_finite: 0, examples: Vec::new() };
+            let mut sink = Sink {
+                unit: &unit,
+                progress,
+                sums: TileSums::new(&tile),
+                finished: 0,
+                rays: worker.counters.total(),
+                non_finite: 0,
+                examples: Vec::new(),
+            };
             tracer.trace(&unit, &mut worker, &mut sink);
+            if progress.is_cancelled() {
+                break;
+            }
             film.store(i, &sink.sums);
             non_finite += sink.non_finite;
             examples.extend(sink.examples.into_iter().map(|e| (i, e)));
-            let rays = worker.counters.camera + worker.counters.bounce + worker.counters.shadow;
-            progress.rays.fetch_add(rays - rays_before, Ordering::Relaxed);
-            rays_before = rays;
-            progress.done.fetch_add(paths, Ordering::Relaxed);
         }
         let mut found = found.lock().expect("no worker panics with the lock held");
         let (totals, all) = &mut *found;

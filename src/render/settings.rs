@@ -99,7 +99,7 @@ pub struct RenderSettings {
     pub accel: AccelChoice,
     /// Folders in which libembree4 is looked for, after `EMBREE_DIR` and before the system's.
     pub embree_dirs: Vec<PathBuf>,
-    /// Worker threads; `None` = the cores this process may use. Does not change a byte of the picture.
+    /// Worker threads; `None` = those of the current rayon pool. Does not change a byte of the picture.
     pub threads: Option<usize>,
     /// SIMD lanes for shading (1, 8, 16); `None` = the most this CPU has. For tests.
     pub lanes: Option<u32>,

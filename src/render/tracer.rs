@@ -3,27 +3,10 @@
 use super::framing::{framing_camera, vector_area};
 use super::{CropWindow, Filter, Prepared, RenderSettings};
 use crate::camera::{Camera, CameraRays, PixelFilter};
-use crate::error::RenderError;
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
 use simd::Level;
 use std::borrow::Cow;
-
-/// Runs `work` on as many threads as `settings` asks for.
-///
-/// # Errors
-/// The threads cannot be started, or `work` fails.
-pub fn on_threads<T: Send>(
-    settings: &RenderSettings,
-    work: impl FnOnce() -> Result<T, RenderError> + Send,
-) -> Result<T, RenderError> {
-    let threads = settings.threads.unwrap_or(0);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| RenderError::TooLarge(format!("cannot start {threads} threads: {e}")))?;
-    pool.install(work)
-}
 
 /// Camera `index` of `scene`, or the one framed on the bounds of a scene without cameras.
 ///

@@ -87,6 +87,13 @@ impl SceneBuilder {
         self.scene.warnings.push(warning.into());
     }
 
+    /// Notes something of the file that will not be in the picture although it should.
+    pub fn lose(&mut self, warning: impl Into<String>) {
+        let warning = warning.into();
+        self.scene.losses.push(warning.clone());
+        self.scene.warnings.push(warning);
+    }
+
     /// Notes a part of the file that was not needed.
     pub fn skip(&mut self, what: impl Into<String>, why: impl Into<String>) {
         self.scene.skipped.push(Skipped { what: what.into(), why: why.into() });

@@ -35,16 +35,20 @@ pub(super) fn check(scene: &mut Scene) {
     check_ids(scene);
     let found: Vec<Found> = scene.meshes.par_iter_mut().map(check_mesh).collect();
     type Count = fn(&Found) -> usize;
-    let kinds: [(Count, &str); 4] = [
-        (|f| f.unusable, "triangles dropped: a vertex is not finite or is beyond 1.844e18"),
-        (|f| f.flat, "triangles dropped: without area"),
-        (|f| f.uvs, "texture coordinates that are not finite: taken as 0"),
-        (|f| f.colors, "vertex colours that are negative or not finite: those channels taken as 0 or 1"),
+    // What has no area would not be seen anyway; all else is lost.
+    let kinds: [(Count, bool, &str); 4] = [
+        (|f| f.unusable, true, "triangles dropped: a vertex is not finite or is beyond 1.844e18"),
+        (|f| f.flat, false, "triangles dropped: without area"),
+        (|f| f.uvs, true, "texture coordinates that are not finite: taken as 0"),
+        (|f| f.colors, true, "vertex colours that are negative or not finite: those channels taken as 0 or 1"),
     ];
-    for (count, what) in kinds {
+    for (count, is_loss, what) in kinds {
         let mut tally = Tally::default();
         scene.meshes.iter().zip(&found).for_each(|(mesh, f)| tally.add(count(f), &mesh.name));
-        tally.warn(scene, what);
+        if let Some(text) = tally.text(what) {
+            scene.losses.extend(is_loss.then(|| text.clone()));
+            scene.warnings.push(text);
+        }
     }
     drop_instances(scene);
     clean_environment(scene);
@@ -58,7 +62,9 @@ fn clean_environment(scene: &mut Scene) {
     let bad = |texel: &&mut [f32; 3]| !texel.iter().all(|c| c.is_finite() && *c >= 0.0);
     let count = environment.radiance.iter_mut().filter(bad).map(|texel| *texel = [0.0; 3]).count();
     if count > 0 {
-        scene.warnings.push(format!("{count} texels of the environment are negative or not finite: taken as black"));
+        let text = format!("{count} texels of the environment are negative or not finite: taken as black");
+        scene.losses.push(text.clone());
+        scene.warnings.push(text);
     }
 }
 
@@ -79,7 +85,7 @@ fn drop_instances(scene: &mut Scene) {
         squashed.add(usize::from(!has_area), &instance.name);
         has_area
     });
-    squashed.warn(scene, "instances dropped: their scale squashes them to a line or a point");
+    scene.warnings.extend(squashed.text("instances dropped: their scale squashes them to a line or a point"));
 }
 
 fn check_ids(scene: &Scene) {
@@ -180,11 +186,9 @@ impl Tally {
         }
     }
 
-    fn warn(self, scene: &mut Scene, what: &str) {
-        if self.count > 0 {
-            let more = if self.more > 0 { format!(" and {} more", self.more) } else { String::new() };
-            scene.warnings.push(format!("{} {what} (in {}{more})", self.count, self.names.join(", ")));
-        }
+    fn text(self, what: &str) -> Option<String> {
+        let more = if self.more > 0 { format!(" and {} more", self.more) } else { String::new() };
+        (self.count > 0).then(|| format!("{} {what} (in {}{more})", self.count, self.names.join(", ")))
     }
 }
 

@@ -38,7 +38,7 @@ pub struct PlacedLight {
 }
 
 /// Something in the file that the picture does not need and that was not read.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Skipped {
     /// JSON pointer without the leading slash, such as `images/3`.
     pub what: String,
@@ -69,6 +69,8 @@ pub struct Scene {
     pub index: usize,
     /// Said to the user and written into the JSON.
     pub warnings: Vec<String>,
+    /// Those of `warnings` that mean that something of the file is not in the picture.
+    pub losses: Vec<String>,
     /// Parts of the file that were not needed.
     pub skipped: Vec<Skipped>,
 }

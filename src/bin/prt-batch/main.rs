@@ -21,6 +21,7 @@ fn main() -> ExitCode {
     match cli.command {
         Some(args::Command::Render(options)) => commands::render::run(&options),
         Some(args::Command::Compare(options)) => commands::compare::run(&options),
+        Some(args::Command::Doctor(options)) => commands::doctor::run(&options),
         None => commands::render::run(&cli.render),
     }
 }

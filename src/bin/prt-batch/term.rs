@@ -3,10 +3,9 @@
 use crate::parse::ProgressStyle;
 use indicatif::{ProgressBar, ProgressStyle as BarStyle};
 use prt::batch::report::{ImageReport, Status};
-use prt::batch::{Observer, Outcome};
+use prt::batch::{ImageId, Observer, Outcome, Started};
 use prt::render::Progress;
 use std::io::{IsTerminal, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -61,7 +60,7 @@ pub enum Verbosity {
 pub struct Reporter {
     style: ProgressStyle,
     verbosity: Verbosity,
-    accel_said: Option<&'static str>,
+    accel_said: Option<String>,
     watcher: Option<Watcher>,
 }
 
@@ -104,14 +103,14 @@ impl Reporter {
 }
 
 impl Observer for Reporter {
-    fn started(&mut self, input: &Path, progress: &Arc<Progress>) {
+    fn started(&mut self, image: &Started) {
         if self.style != ProgressStyle::None && self.verbosity > Verbosity::Quiet {
             let bar = self.style == ProgressStyle::Auto && std::io::stderr().is_terminal();
-            self.watcher = Some(Watcher::start(input.display().to_string(), Arc::clone(progress), bar));
+            self.watcher = Some(Watcher::start(image.input.display().to_string(), Arc::clone(&image.progress), bar));
         }
     }
 
-    fn finished(&mut self, image: &ImageReport) {
+    fn finished(&mut self, _id: ImageId, image: &ImageReport) {
         // Ends the bar before anything else is printed.
         self.watcher = None;
         if let Some(message) = &image.error_message {
@@ -121,9 +120,9 @@ impl Observer for Reporter {
             return;
         }
         // Once, and again where another backend takes over: `auto` opens no Embree for a scene that needs none.
-        if let (Some(used), true) = (image.accel.used, image.accel.used != self.accel_said) {
-            self.accel_said = Some(used);
-            let words = [Some(used), image.accel.version.as_deref(), image.accel.isa.as_deref()];
+        if let (Some(used), true) = (&image.accel.used, image.accel.used != self.accel_said) {
+            self.accel_said = Some(used.clone());
+            let words = [Some(used.as_str()), image.accel.version.as_deref(), image.accel.isa.as_deref()];
             let words: Vec<_> = words.into_iter().flatten().collect();
             // The last line of the note is its gist, those before say what was tried.
             let note = match self.verbosity {

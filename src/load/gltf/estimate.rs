@@ -36,11 +36,10 @@ pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<Lo
     }
     let container = container::read(path).ok()?;
     let outline: Outline = serde_json::from_slice(&container.json).ok()?;
-    let data: u64 = (outline.buffers.iter().filter_map(|b| b.uri.as_ref()))
-        .filter(|uri| uri.is_data())
-        .map(|uri| uri.length)
-        .sum();
-    let images: u64 = (outline.images.iter().filter_map(|i| i.uri.as_ref())).filter(|u| u.is_data()).map(|u| u.length).sum();
+    let data: u64 =
+        (outline.buffers.iter().filter_map(|b| b.uri.as_ref())).filter(|uri| uri.is_data()).map(|uri| uri.length).sum();
+    let images: u64 =
+        (outline.images.iter().filter_map(|i| i.uri.as_ref())).filter(|u| u.is_data()).map(|u| u.length).sum();
     // Text that is data is kept twice, and once decoded where it is read.
     let text = length.saturating_sub(data + images) * JSON;
     let json = text + 2 * (data + images) + data / 4 * 3;

@@ -94,12 +94,12 @@ pub(super) fn warn_ignored(loader: &mut Loader) {
     for (name, (first, count)) in ignored.iter() {
         let more = if *count > 1 { format!(", first of {count} places") } else { String::new() };
         let loss = LOSSES.iter().find(|(n, _)| n == name).map(|(_, loss)| format!(": {loss}")).unwrap_or_default();
-        loader.builder.warn(format!("{first}: the extension {} is not read{more}{loss}", shorten(name)));
+        loader.builder.lose(format!("{first}: the extension {} is not read{more}{loss}", shorten(name)));
     }
     for name in &doc.root.extensions_used {
         let is_alternative = IMAGE_FORMATS.contains(&name.as_str()) || COMPRESSIONS.contains(&name.as_str());
         if is_ignored(name) && !ignored.contains_key(name) && !is_alternative {
-            loader.builder.warn(format!("the extension {} is used somewhere and not read", shorten(name)));
+            loader.builder.lose(format!("the extension {} is used somewhere and not read", shorten(name)));
         }
     }
 }

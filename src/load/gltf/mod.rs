@@ -136,6 +136,13 @@ impl<'d> Loader<'d> {
         }
     }
 
+    /// Notes the loss `text` unless it was noted before.
+    fn lose_once(&mut self, text: &'static str) {
+        if self.said.insert(text) {
+            self.builder.lose(text);
+        }
+    }
+
     /// Lists the parts of the file that the scene does not reach.
     fn note_skipped(&mut self) {
         let root = &self.doc.root;

@@ -212,7 +212,7 @@ fn place_mesh(
     let worlds = match (instancing, posed.world) {
         (None, Some(world)) => vec![world],
         (Some(_), Some(world)) => {
-            loader.warn_once("instances of a skinned mesh are not placed: its joints place it, once");
+            loader.lose_once("instances of a skinned mesh are not placed: its joints place it, once");
             vec![world]
         }
         (None, None) => vec![world],

@@ -26,7 +26,7 @@ pub(super) fn read(
         extensions::note_carried(doc, carried.others.keys(), at, &["KHR_draco_mesh_compression"]);
     }
     let Some(positions) = Attributes { loader, primitive, at }.open(&Semantic::Positions, &POSITION, None)? else {
-        loader.builder.warn(format!("{name}: {at} has no POSITION: nothing to draw"));
+        loader.builder.lose(format!("{name}: {at} has no POSITION: nothing to draw"));
         return Ok(None);
     };
     if positions.is_zero() && weights.is_empty() {
@@ -81,10 +81,10 @@ pub(super) fn read(
     }
     for set in missing {
         let text = format!("{name}: {at} has no TEXCOORD_{set}, which {} reads: taken as 0", surface.pointer);
-        loader.builder.warn(text);
+        loader.builder.lose(text);
     }
     if primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(1))) {
-        loader.warn_once("vertex colours other than COLOR_0 are ignored");
+        loader.lose_once("vertex colours other than COLOR_0 are ignored");
     }
     if let Some(map) = normal_map {
         add_tangents(loader, &mut mesh, at, &map);
@@ -139,19 +139,19 @@ fn triangles(
     match made {
         Topology::Triangles(triangles, rest) => {
             if triangles.is_empty() {
-                loader.builder.warn(format!("{name}: {at} has {n} vertices and no triangle: left out"));
+                loader.builder.lose(format!("{name}: {at} has {n} vertices and no triangle: left out"));
                 return Ok(None);
             }
             if rest > 0 {
                 let text = format!("{name}: the corners of {at} are not a multiple of 3: the last {rest} ignored");
-                loader.builder.warn(text);
+                loader.builder.lose(text);
             }
             Ok(Some(triangles))
         }
         Topology::Without(count, what) => {
             let why = format!("{count} {what}: they have no surface to draw");
             loader.builder.skip(at.trim_start_matches('/'), why);
-            loader.warn_once("the scene has points or lines, which are not drawn (listed under skipped)");
+            loader.lose_once("the scene has points or lines, which are not drawn (listed under skipped)");
             Ok(None)
         }
     }

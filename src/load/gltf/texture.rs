@@ -84,7 +84,7 @@ fn source(loader: &mut Loader, texture: &gltf::json::Texture, at: &str) -> Resul
     }
     let names: Vec<String> = names.map(|n| shorten(n)).collect();
     let but = if names.is_empty() { String::new() } else { format!(" but {}, which is not read", names.join(", ")) };
-    loader.builder.warn(format!("{at} has no source{but}: materials are drawn without this texture"));
+    loader.builder.lose(format!("{at} has no source{but}: materials are drawn without this texture"));
     Ok(None)
 }
 

@@ -126,8 +126,7 @@ mod tests {
     fn statements_are_counted_with_their_corners() {
         let mut counts = Counts::default();
         counts.add(b"v 0 1 2\n v\t1 2 3\nvt 0 0\nvn 0 0 1\nf 1 2 3\nf 1/1 2/2  3/3 4/4\r\n# v\nvp 1\no v\n");
-        let expected =
-            Counts { vertices: 2.0, texture_coordinates: 1.0, normals: 1.0, corners: 7.0, triangles: 3.0 };
+        let expected = Counts { vertices: 2.0, texture_coordinates: 1.0, normals: 1.0, corners: 7.0, triangles: 3.0 };
         assert_eq!(counts, expected);
     }
 }

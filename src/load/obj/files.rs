@@ -73,12 +73,20 @@ pub(super) struct Pictures {
     decoded: BTreeMap<PathBuf, Picture>,
 }
 
+/// What is said about pictures that were looked for.
+pub(super) enum Note {
+    /// It was found somewhere else.
+    Warning(String),
+    /// There is none.
+    Loss(String),
+}
+
 impl Pictures {
     /// Finds and decodes what `maps` name, each with the folder of its MTL file; the rest of the maps lack a picture.
     pub fn load<'m>(
         folders: &Folders,
         maps: impl Iterator<Item = (&'m str, &'m Map)>,
-        warn: &mut dyn FnMut(String),
+        note: &mut dyn FnMut(Note),
     ) -> Self {
         let mut pictures = Self::default();
         let mut wanted: BTreeMap<PathBuf, &str> = BTreeMap::new();
@@ -90,12 +98,12 @@ impl Pictures {
             }
             let path = match find(folders, folder, &map.file) {
                 Ok(found) => {
-                    found.warning.into_iter().for_each(|w| warn(format!("{}: {w}", map.at)));
+                    found.warning.into_iter().for_each(|w| note(Note::Warning(format!("{}: {w}", map.at))));
                     wanted.entry(found.path.clone()).or_insert(&map.at);
                     Some(found.path)
                 }
                 Err(why) => {
-                    warn(format!("{}: texture {why}: the material goes without it", map.at));
+                    note(Note::Loss(format!("{}: texture {why}: the material goes without it", map.at)));
                     None
                 }
             };
@@ -108,7 +116,7 @@ impl Pictures {
                 Ok(picture) => _ = pictures.decoded.insert(path, picture),
                 Err(why) => {
                     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    warn(format!("{at}: texture {name}: {why}: the material goes without it"));
+                    note(Note::Loss(format!("{at}: texture {name}: {why}: the material goes without it")));
                 }
             }
         }

@@ -97,6 +97,10 @@ impl Converter<'_> {
         self.builder.warn(format!("{}: \"{}\": {what}", self.w.at, self.w.name));
     }
 
+    fn lose(&mut self, what: &str) {
+        self.builder.lose(format!("{}: \"{}\": {what}", self.w.at, self.w.name));
+    }
+
     fn texture(
         &mut self,
         map: Option<&super::map::Map>,
@@ -200,7 +204,7 @@ impl Converter<'_> {
             && let Some((texture, _)) = self.texture(Some(map), Meaning::Normal)
         {
             if (map.base, map.gain) != (0.0, 1.0) {
-                self.warn("-mm of a normal map is ignored");
+                self.lose("-mm of a normal map is ignored");
             }
             m.normal = Param { factor: map.bump, texture: Some(texture) };
         }
@@ -213,10 +217,10 @@ impl Converter<'_> {
 
     fn remarks(&mut self) {
         if !self.w.ignored.is_empty() {
-            self.warn(&format!("{} ignored: there is nothing like it here", self.w.ignored.join(", ")));
+            self.lose(&format!("{} ignored: there is nothing like it here", self.w.ignored.join(", ")));
         }
         if let Some(illum @ (4.0 | 6.0 | 7.0 | 9.0)) = self.w.illum {
-            self.warn(&format!("illum {illum} asks for refraction, which is not built: only d lets light through"));
+            self.lose(&format!("illum {illum} asks for refraction, which is not built: only d lets light through"));
         }
     }
 }

@@ -102,21 +102,22 @@ struct Made {
 impl Loader<'_> {
     /// Warns of what was counted.
     fn notes(&mut self, geometry: &Geometry) {
-        let mut warn = |note: Note, what: &str| {
+        let mut say = |is_loss: bool, note: Note, what: &str| {
             let (count, first) = geometry.notes[note as usize];
             if count > 0 {
-                self.builder.warn(format!("{}: {count} {what} (this is the first)", self.text.at(first)));
+                let text = format!("{}: {count} {what} (this is the first)", self.text.at(first));
+                if is_loss { self.builder.lose(text) } else { self.builder.warn(text) }
             }
         };
-        warn(Note::PointsAndLines, "statements with points or lines: not drawn");
-        warn(Note::FreeForm, "statements of free-form curves and surfaces: not drawn");
-        warn(Note::ShortFaces, "faces with fewer than three corners: not drawn");
-        warn(Note::NumberTails, "numbers with something behind them: used as far as they are numbers");
-        warn(Note::MoreNumbers, "lines with more numbers than their kind has: those are ignored");
-        warn(Note::OtherFiles, "statements that call other files: ignored");
-        warn(Note::SmoothWords, "smoothing groups that are neither a number nor off: taken as off");
-        warn(Note::AbsentLists, "indices of texture coordinates or normals in a file that has none: ignored");
-        warn(Note::Unknown, "lines that are no statements of OBJ: ignored");
+        say(true, Note::PointsAndLines, "statements with points or lines: not drawn");
+        say(true, Note::FreeForm, "statements of free-form curves and surfaces: not drawn");
+        say(true, Note::ShortFaces, "faces with fewer than three corners: not drawn");
+        say(false, Note::NumberTails, "numbers with something behind them: used as far as they are numbers");
+        say(false, Note::MoreNumbers, "lines with more numbers than their kind has: those are ignored");
+        say(true, Note::OtherFiles, "statements that call other files: ignored");
+        say(false, Note::SmoothWords, "smoothing groups that are neither a number nor off: taken as off");
+        say(true, Note::AbsentLists, "indices of texture coordinates or normals in a file that has none: ignored");
+        say(true, Note::Unknown, "lines that are no statements of OBJ: ignored");
     }
 
     /// Reads the MTL files; of two materials with one name the first counts.
@@ -137,7 +138,7 @@ impl Loader<'_> {
             };
             for (name, found) in found {
                 match found {
-                    Err(why) => self.builder.warn(format!("{at}: mtllib {why}: its materials get the default")),
+                    Err(why) => self.builder.lose(format!("{at}: mtllib {why}: its materials get the default")),
                     Ok(found) => {
                         found.warning.iter().for_each(|w| self.builder.warn(format!("{at}: mtllib {w}")));
                         if !read.contains(&found.path) {
@@ -155,10 +156,10 @@ impl Loader<'_> {
         let shown = self.text.file.with_file_name(&name);
         let bytes = match read_file(path) {
             Ok(bytes) => bytes,
-            Err(why) => return self.builder.warn(format!("{}: {why}: its materials get the default", shown.display())),
+            Err(why) => return self.builder.lose(format!("{}: {why}: its materials get the default", shown.display())),
         };
         let (materials, warnings) = mtl::read(&Text::new(&shown, bytes));
-        warnings.into_iter().for_each(|w| self.builder.warn(w));
+        warnings.into_iter().for_each(|w| self.builder.lose(w));
         let folder = name.rsplit_once('/').map_or("", |(folder, _)| folder);
         for mut written in materials {
             material::drop_unused_maps(&mut written);
@@ -179,7 +180,10 @@ impl Loader<'_> {
         let maps = used.flat_map(|e| e.written.maps.all().map(|map| (e.folder.as_str(), map)));
         let before = Instant::now();
         let builder = &mut self.builder;
-        let pictures = files::Pictures::load(&self.folders, maps, &mut |w| builder.warn(w));
+        let pictures = files::Pictures::load(&self.folders, maps, &mut |note| match note {
+            files::Note::Warning(text) => builder.warn(text),
+            files::Note::Loss(text) => builder.lose(text),
+        });
         *decode += before.elapsed().as_secs_f64();
         let mut textures = texture::Textures::new(pictures);
         let mut made = Vec::with_capacity(geometry.materials.len());
@@ -207,7 +211,7 @@ impl Loader<'_> {
             let names = shown(lost.iter().map(|(name, _)| name.as_str()));
             let text =
                 format!("{}: no MTL file that was found has the material {names}: the default", self.text.at(*first));
-            self.builder.warn(text);
+            self.builder.lose(text);
         }
         made
     }
@@ -262,7 +266,7 @@ impl Loader<'_> {
             let names = names(&|b| b.half_coloured);
             warnings.push(format!("vertex colours are ignored where only some vertices have one (in {names})"));
         }
-        warnings.into_iter().for_each(|w| self.builder.warn(w));
+        warnings.into_iter().for_each(|w| self.builder.lose(w));
         let world = placement(options);
         let stem = self.text.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         for mesh::Built { mut mesh, .. } in built {

@@ -2,15 +2,13 @@
 
 use crate::args::RenderArgs;
 use crate::term::{self, Reporter, Verbosity};
-use prt::batch::{self, BatchSettings, CameraSource, FileOptions, PictureSize, Stop, View};
+use prt::batch::input::expand;
+use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, View};
 use prt::color::ToneMap;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-
-/// Width of a picture when no option says it.
-const DEFAULT_WIDTH: u32 = 1280;
 
 pub fn run(args: &RenderArgs) -> ExitCode {
     if args.inputs.is_empty() {
@@ -18,14 +16,26 @@ pub fn run(args: &RenderArgs) -> ExitCode {
             "no INPUT: give .gltf, .glb or .obj files, or a folder of them, such as: prt-batch scenes/ --out renders",
         );
     }
-    let settings = settings(args);
+    let settings = BatchSettings {
+        tasks: BatchSettings::tasks_for(expand(&args.inputs), file_settings(args)),
+        out: args.out.clone(),
+        threads: args.threads,
+        memory: args.memory,
+        force: args.force,
+        report: !args.no_report,
+        command: command_line(),
+        ..BatchSettings::default()
+    };
+    if args.explain {
+        return super::explain::run(&settings, args.json);
+    }
     let verbosity = match (args.quiet, args.verbose) {
         (true, _) => Verbosity::Quiet,
         (_, true) => Verbosity::Verbose,
         _ => Verbosity::Normal,
     };
     let mut reporter = Reporter::new(args.progress, verbosity);
-    match batch::run(&settings, &mut reporter) {
+    match batch::run(settings, &mut reporter) {
         Ok(outcome) => {
             reporter.summary(&outcome);
             if args.json {
@@ -41,7 +51,7 @@ pub fn run(args: &RenderArgs) -> ExitCode {
     }
 }
 
-fn settings(args: &RenderArgs) -> BatchSettings {
+fn file_settings(args: &RenderArgs) -> FileSettings {
     let render = RenderSettings {
         crop: args.crop,
         spp: args.spp,
@@ -53,13 +63,10 @@ fn settings(args: &RenderArgs) -> BatchSettings {
         default_light: args.default_light,
         accel: args.accel,
         embree_dirs: embree_dirs(),
-        threads: args.threads,
         ..RenderSettings::default()
     };
-    let width = PictureSize::Width(args.width.unwrap_or(DEFAULT_WIDTH));
-    BatchSettings {
-        inputs: args.inputs.clone(),
-        out: args.out.clone(),
+    let width = PictureSize::Width(args.width.unwrap_or(PictureSize::DEFAULT_WIDTH));
+    FileSettings {
         name: args.name.clone(),
         size: args.size.map_or(width, |(width, height)| PictureSize::Exact(width, height)),
         camera_source: camera_source(args),
@@ -78,7 +85,6 @@ fn settings(args: &RenderArgs) -> BatchSettings {
             compression: args.exr_compression,
             tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
         },
-        command: command_line(),
     }
 }
 
@@ -97,7 +103,7 @@ fn camera_source(args: &RenderArgs) -> CameraSource {
 
 /// Where libembree4 may lie beside this program: an installation's folders, the project's when run from its target
 /// folder, and the current folder's.
-fn embree_dirs() -> Vec<PathBuf> {
+pub fn embree_dirs() -> Vec<PathBuf> {
     let mut dirs = Vec::new();
     if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
         dirs.extend([folder.join(".embree"), folder.join("../lib")]);

@@ -1,0 +1,67 @@
+//! What images say about themselves, put into their reports.
+
+use super::report::{self, Accel, ImageReport, Rays};
+use super::settings::FileSettings;
+use crate::render::{AccelChoice, DefaultLight, Frame};
+use std::path::Path;
+
+/// The report of an image of which nothing is known but what was asked for.
+pub(super) fn blank(input: &Path, settings: &FileSettings) -> ImageReport {
+    let render = &settings.render;
+    ImageReport {
+        input: input.display().to_string(),
+        spp: render.spp,
+        seed: render.seed,
+        accel: Accel { requested: accel_name(render.accel).into(), ..Accel::default() },
+        ..ImageReport::default()
+    }
+}
+
+/// Adds what `frame` says about itself.
+pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
+    let stats = &frame.stats;
+    let total = stats.camera_rays + stats.bounce_rays + stats.shadow_rays;
+    let some = |text: &String| (!text.is_empty()).then(|| text.clone());
+    image.spp = frame.spp;
+    image.accel.used = Some(stats.accel.used.into());
+    (image.accel.version, image.accel.isa) = (some(&stats.accel.version), some(&stats.accel.isa));
+    image.accel_note.clone_from(&stats.accel.note);
+    (image.seconds.build, image.seconds.render) = (Some(stats.build_seconds), Some(stats.render_seconds));
+    let (camera, bounce, shadow) = (stats.camera_rays, stats.bounce_rays, stats.shadow_rays);
+    image.rays = Some(Rays { camera, bounce, shadow, total });
+    image.mrays_per_s = (stats.render_seconds > 0.0).then(|| total as f64 / stats.render_seconds * 1e-6);
+    image.non_finite_samples = Some(stats.non_finite_samples);
+    image.truncated = Some(stats.truncated);
+    image.triangles = Some(stats.triangles);
+    image.instances = Some(stats.instances);
+    image.lights = Some(stats.lights);
+    image.default_light = Some(report::DefaultLight {
+        requested: default_light_name(stats.default_light.requested).into(),
+        used: stats.default_light.used,
+        emitted_lm_per_m2: stats.default_light.emitted.by_lamps,
+        glowing_share: stats.default_light.emitted.glowing,
+    });
+    image.notes.extend(stats.default_light.note());
+    image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
+    image.warnings.extend(stats.warnings.iter().cloned());
+    image.losses.extend(stats.losses.iter().cloned());
+}
+
+/// The option's value.
+pub(super) fn accel_name(accel: AccelChoice) -> &'static str {
+    match accel {
+        AccelChoice::Auto => "auto",
+        AccelChoice::Embree => "embree",
+        AccelChoice::Bvh => "bvh",
+        AccelChoice::Linear => "linear",
+    }
+}
+
+/// The option's value.
+pub(super) fn default_light_name(choice: DefaultLight) -> &'static str {
+    match choice {
+        DefaultLight::Auto => "auto",
+        DefaultLight::On => "on",
+        DefaultLight::Off => "off",
+    }
+}

@@ -1,0 +1,161 @@
+//! Renders the scenes that were read.
+
+use super::describe::{blank, describe};
+use super::load_stage::{Contents, guarded};
+use super::report::{ImageReport, Status};
+use super::run::{Event, ImageId, Shared, reported_name};
+use super::settings::Task;
+use super::size::{aspect_note, check_crop, size_for};
+use super::write_stage::Made;
+use crate::error::RenderError;
+use crate::render::{Frame, Progress, RenderSettings, render};
+use crate::scene::Scene;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, SyncSender};
+use std::time::Instant;
+
+/// A file that was read, or why not.
+pub(super) struct Loaded {
+    pub task: usize,
+    /// Of its first image.
+    pub id: ImageId,
+    /// Of its first image.
+    pub progress: Arc<Progress>,
+    pub contents: Result<Contents, String>,
+    /// Wall seconds of reading.
+    pub seconds: f64,
+}
+
+/// The thread that renders.
+pub(super) struct RenderStage {
+    pub shared: Arc<Shared>,
+    pub events: Sender<Event>,
+    pub pool: rayon::ThreadPool,
+}
+
+/// The receiving end is gone, or nothing is to be handed on any more.
+struct Ended;
+
+impl RenderStage {
+    /// Renders what comes, in order, and hands it on.
+    pub fn run(&self, loaded: &Receiver<Loaded>, to_write: &SyncSender<Made>) {
+        for loaded in loaded {
+            if self.shared.is_stopped() || self.file(loaded, to_write).is_err() {
+                return;
+            }
+        }
+    }
+
+    fn hand_on(&self, made: Made, to_write: &SyncSender<Made>) -> Result<(), Ended> {
+        let is_open = self.shared.opens_to_writer();
+        if is_open && to_write.send(made).is_ok() { Ok(()) } else { Err(Ended) }
+    }
+
+    /// All images of one file.
+    fn file(&self, loaded: Loaded, to_write: &SyncSender<Made>) -> Result<(), Ended> {
+        let Loaded { task, id, progress, contents, seconds } = loaded;
+        let Task { input, settings } = &self.shared.settings.tasks[task];
+        let naming = &self.shared.plan.namings[task];
+        let image = || Box::new(blank(&input.path, settings));
+        let Contents { scene, times, names, chosen } = match contents {
+            Ok(contents) => contents,
+            Err(message) => {
+                let mut image = image();
+                fail(&mut image, message);
+                image.seconds.total = seconds;
+                // A pattern or a folder has no name of its own to write under.
+                let output = input.problem.is_none().then(|| naming.output("0", false));
+                return self
+                    .hand_on(Made { task, id, progress, image, output, frame: None, is_bad_input: true }, to_write);
+            }
+        };
+        let outputs = naming.outputs(&names, &chosen);
+        let mut first = Some((id, progress, seconds, times.load, times.decode));
+        for (&camera, output) in chosen.iter().zip(outputs) {
+            let (id, progress, before, load, decode) = first.take().unwrap_or_else(|| {
+                let (id, progress) = self.shared.start(&self.events, task, &output);
+                // The file was read for the first image already.
+                (id, progress, 0.0, 0.0, 0.0)
+            });
+            let clock = Instant::now();
+            let mut image = image();
+            (image.seconds.load, image.seconds.decode) = (Some(load), Some(decode));
+            image.scene = Some(scene.index);
+            image.camera = reported_name(&names, camera);
+            image.warnings.clone_from(&scene.warnings);
+            image.losses.clone_from(&scene.losses);
+            image.skipped.clone_from(&scene.skipped);
+            let mut made = Made { task, id, progress, image, output: None, frame: None, is_bad_input: false };
+            // Names that were guessed before loading are known now.
+            if self.shared.plan.owners.get(&output).is_some_and(|owner| *owner != task) {
+                let (path, output) = (input.path.display(), output.display());
+                fail(&mut made.image, format!("{path}: {output} belongs to another input; use --name"));
+            } else {
+                made.output = Some(output);
+                match self.image(task, &scene, camera, &made.progress, &mut made.image) {
+                    Ok(frame) => made.frame = frame.map(Box::new),
+                    Err(Interrupted) => return Err(Ended),
+                }
+            }
+            made.image.seconds.total = before + clock.elapsed().as_secs_f64();
+            self.hand_on(made, to_write)?;
+            if self.shared.is_stopped() {
+                return Err(Ended);
+            }
+        }
+        Ok(())
+    }
+
+    /// One image; `None` if there is nothing to write, for which `image` has the reason.
+    fn image(
+        &self,
+        task: usize,
+        scene: &Scene,
+        camera: usize,
+        progress: &Progress,
+        image: &mut ImageReport,
+    ) -> Result<Option<(Frame, RenderSettings)>, Interrupted> {
+        if scene.triangle_count() == 0 {
+            image.status = Status::Empty;
+            image.warnings.push("nothing drawable: the scene has no triangles; no picture was written".into());
+            return Ok(None);
+        }
+        let file = &*self.shared.settings.tasks[task].settings;
+        let mut settings = RenderSettings { threads: None, ..file.render.clone() };
+        (settings.width, settings.height) = size_for(file.size, scene, camera);
+        (image.width, image.height) = (Some(settings.width), Some(settings.height));
+        image.notes.extend(aspect_note(file.size, scene, camera));
+        let mut is_interrupted = false;
+        let rendered = match settings.crop.map_or(Ok(()), |c| check_crop(c, settings.width, settings.height)) {
+            Err(message) => Err(message),
+            Ok(()) => self.pool.install(|| {
+                guarded(|| {
+                    render(scene, camera, &settings, progress).map_err(|error| {
+                        is_interrupted = error == RenderError::Interrupted;
+                        error.to_string()
+                    })
+                })
+            }),
+        };
+        match rendered {
+            Ok(frame) => {
+                describe(&frame, image);
+                Ok(Some((frame, settings)))
+            }
+            Err(_) if is_interrupted => Err(Interrupted),
+            Err(message) => {
+                fail(image, format!("{}: {message}", image.input));
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// The run is to end.
+struct Interrupted;
+
+/// Makes `image` a failure.
+pub(super) fn fail(image: &mut ImageReport, message: String) {
+    image.status = Status::Failed;
+    image.error_message = Some(message);
+}
