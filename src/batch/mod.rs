@@ -3,9 +3,11 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+pub mod content;
 mod describe;
 pub mod doctor;
 pub mod explain;
+pub mod fingerprint;
 pub mod host;
 pub mod input;
 pub mod job;
@@ -20,6 +22,7 @@ pub mod report;
 mod run;
 mod settings;
 mod size;
+pub mod up_to_date;
 mod view;
 mod write_stage;
 

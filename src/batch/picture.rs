@@ -25,7 +25,7 @@ impl Default for FileOptions {
     }
 }
 
-/// The bytes of the EXR.
+/// The bytes of the EXR; `fingerprint` is that of its pixels ([`super::fingerprint::Fingerprint::pixels`]), if known.
 ///
 /// # Errors
 /// See [`exr::encode`].
@@ -33,6 +33,7 @@ pub(super) fn exr_bytes(
     frame: &Frame,
     settings: &RenderSettings,
     compression: ExrCompression,
+    fingerprint: Option<&str>,
 ) -> Result<Vec<u8>, String> {
     let window = frame.window;
     let camera = ExrCamera {
@@ -49,7 +50,7 @@ pub(super) fn exr_bytes(
         size: [window.width, window.height],
         pixels: &frame.pixels,
         camera,
-        attributes: attributes(frame, settings),
+        attributes: attributes(frame, settings, fingerprint),
     };
     exr::encode(&picture, compression)
 }
@@ -68,7 +69,7 @@ pub(super) fn png_bytes(frame: &Frame, tone: &ToneMap) -> (Vec<u8>, u64) {
 
 /// The `prt:` attributes. Only what determines the pixels, so that equal renders have equal bytes: no times, paths,
 /// host, threads.
-fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, ExrValue)> {
+fn attributes(frame: &Frame, settings: &RenderSettings, fingerprint: Option<&str>) -> Vec<(&'static str, ExrValue)> {
     let stats = &frame.stats;
     let mut attributes = vec![
         ("prt:version", ExrValue::Text(crate::VERSION.into())),
@@ -88,6 +89,7 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }
+    attributes.extend(fingerprint.map(|hash| ("prt:fingerprint", ExrValue::Text(hash.into()))));
     attributes
 }
 
@@ -143,7 +145,7 @@ mod tests {
     #[test]
     fn files_hold_the_window_of_the_frame() {
         let frame = frame();
-        let bytes = exr_bytes(&frame, &RenderSettings::default(), ExrCompression::Zip).unwrap();
+        let bytes = exr_bytes(&frame, &RenderSettings::default(), ExrCompression::Zip, None).unwrap();
         let read = exr_read::decode(&bytes).unwrap();
         assert_eq!((read.origin, read.width, read.height), ([3, 2], 2, 1));
         assert_eq!(read.pixels[0], frame.pixels[0]);
@@ -155,10 +157,15 @@ mod tests {
 
     #[test]
     fn attributes_are_those_of_the_contract() {
-        let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
+        let names = |fingerprint| -> Vec<_> {
+            attributes(&frame(), &RenderSettings::default(), fingerprint).iter().map(|a| a.0).collect()
+        };
         #[rustfmt::skip]
-        assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
+        assert_eq!(names(None), ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
             "prt:normals", "prt:light", "prt:nonFinite", "prt:truncated", "prt:biased"]);
+        let with_fingerprint = names(Some("0123"));
+        assert_eq!(with_fingerprint[..11], names(None));
+        assert_eq!(with_fingerprint[11..], ["prt:fingerprint"]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What happened, as JSON: one document per image and `batch.json` for the run. A field whose feature is not built is
 //! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
 
+use super::fingerprint::Fingerprint;
 use crate::scene::Skipped;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -62,6 +63,8 @@ pub struct ImageReport {
     pub warnings: Vec<String>,
     /// Those of `warnings` that mean that something of the file is not in the picture: `--strict` fails on them.
     pub losses: Vec<String>,
+    /// What it was made from; `None`: that is not known, and it will not be taken for up to date.
+    pub fingerprint: Option<Fingerprint>,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,

@@ -1,5 +1,6 @@
 //! Writes the pictures that were rendered, EXR first, the report last: it says what the others hold.
 
+use super::fingerprint::Fingerprint;
 use super::output::{WriteError, write_atomic};
 use super::picture::{exr_bytes, png_bytes};
 use super::render_stage::fail;
@@ -87,8 +88,9 @@ impl WriteStage {
     ) -> Result<(), WriteError> {
         let files = self.shared.settings.tasks[task].settings.files;
         if files.exr {
-            match self.shared.beside.install(|| exr_bytes(frame, settings, files.compression)) {
-                Ok(bytes) => image.outputs.exr = Some(self.file(output, "exr", &bytes)?),
+            let fingerprint = image.fingerprint.as_ref().map(|f| f.pixels.as_str());
+            match self.shared.beside.install(|| exr_bytes(frame, settings, files.compression, fingerprint)) {
+                Ok(bytes) => image.outputs.exr = Some(self.file(output, "exr", &bytes, &mut image.fingerprint)?),
                 Err(error) => {
                     fail(image, format!("{}: {error}", image.input));
                     return Ok(());
@@ -100,16 +102,26 @@ impl WriteStage {
             if nan_channels > 0 {
                 image.warnings.push(format!("{nan_channels} channels of the picture are NaN; the PNG shows them as 0"));
             }
-            image.outputs.png = Some(self.file(output, "png", &bytes)?);
+            image.outputs.png = Some(self.file(output, "png", &bytes, &mut image.fingerprint)?);
         }
         image.status = Status::Rendered;
         Ok(())
     }
 
-    /// Writes `<out>/<output>.<extension>` and tells its path.
-    fn file(&self, output: &Path, extension: &str, bytes: &[u8]) -> Result<String, WriteError> {
+    /// Writes `<out>/<output>.<extension>`, notes it and tells its path.
+    fn file(
+        &self,
+        output: &Path,
+        extension: &str,
+        bytes: &[u8],
+        fingerprint: &mut Option<Fingerprint>,
+    ) -> Result<String, WriteError> {
         let path = self.path(output, extension);
-        write_atomic(&path, bytes).map(|()| path.display().to_string())
+        write_atomic(&path, bytes)?;
+        if let Some(fingerprint) = fingerprint {
+            fingerprint.add_output(extension, bytes);
+        }
+        Ok(path.display().to_string())
     }
 
     fn path(&self, output: &Path, extension: &str) -> PathBuf {

@@ -7,6 +7,7 @@ pub mod obj;
 mod tangents;
 
 pub use estimate::{LoadEstimate, estimate};
+pub use folders::Folders;
 
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};
