@@ -108,8 +108,11 @@ pub fn doctor(embree_dirs: &[PathBuf], memory: Option<MemoryLimit>) -> Doctor {
             ));
         }
     }
-    // A library that the user points at, by a folder or by EMBREE_DIR, is meant to be used.
-    let refused = located.as_ref().map_or_else(Vec::as_slice, |found| &found.refused);
+    // A library that the user points at is meant to be used.
+    let refused = match &located {
+        Ok(found) => &found.refused,
+        Err(refused) => refused,
+    };
     let embree_dir = std::env::var_os("EMBREE_DIR").filter(|dir| !dir.is_empty());
     if let Some(dir) = embree_dir {
         let dir = dir.to_string_lossy().into_owned();
