@@ -69,6 +69,9 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--exr-compression", "dwaa", "zip, zips, piz, rle, none"),
         ("--progress", "dots", "auto, plain, json, none"),
         ("--threads", "0", "from 1"),
+        ("--memory", "0", "8GiB"),
+        ("--memory", "8G", "KiB MiB GiB TiB"),
+        ("--memory", "-5%", "from 1% to 100%"),
         ("--name", "{steam}", "{stem}, {parent}, {camera}"),
         ("--name", "{frame}", "not built yet"),
         ("--name", "../{stem}", "below the output folder"),
@@ -101,15 +104,14 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         "--sensor",
         "--aov",
         "--config",
-        "--memory",
     ] {
         refused(root.path(), &["a.gltf", option, "-1"], 2, &[&format!("{option} is not built yet")]);
         refused(root.path(), &["render", option, "1", "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
-    for option in ["--transparent", "--strict", "--texture-lod", "--explain"] {
+    for option in ["--transparent", "--strict", "--texture-lod"] {
         refused(root.path(), &[option, "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
-    for command in ["bench", "verify", "doctor"] {
+    for command in ["bench", "verify"] {
         refused(root.path(), &[command, "a.gltf", "--out", "x"], 2, &[&format!("{command} is not built yet")]);
     }
     assert!(!root.path().join("renders").exists());

@@ -2,7 +2,7 @@
 
 use crate::parse::{self, ProgressStyle};
 use clap::{Args, Parser, Subcommand};
-use prt::batch::{job::CameraChoice, names::NameTemplate};
+use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
@@ -45,6 +45,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Tone-map stored EXRs again, no rendering.
     Retone(RetoneArgs),
+    /// What was found on this machine: processors, memory, Embree; and whether the ray backends work.
+    Doctor(DoctorArgs),
 }
 
 #[derive(Args, Debug)]
@@ -158,6 +160,12 @@ pub struct RenderArgs {
     /// Worker threads; they do not change a byte of a picture [default: the cores this process may use]
     #[arg(short, long, value_name = "N", value_parser = parse::threads)]
     pub threads: Option<usize>,
+    /// Memory that may be used, such as 8GiB or 50%; what would need more is refused [default: 80%]
+    #[arg(long, value_name = "AMOUNT", value_parser = parse::memory, allow_hyphen_values = true)]
+    pub memory: Option<MemoryLimit>,
+    /// Print the plan of each image, with what is skipped and why, memory and time; render nothing
+    #[arg(long)]
+    pub explain: bool,
     /// Render even what is up to date
     #[arg(long)]
     pub force: bool,
@@ -173,6 +181,13 @@ pub struct RenderArgs {
     /// Say only what went wrong
     #[arg(short, long, conflicts_with = "verbose")]
     pub quiet: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct DoctorArgs {
+    /// Print the result as JSON on stdout
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Args, Debug)]

@@ -28,6 +28,7 @@ fn run() -> ExitCode {
         Some(args::Command::Render(options)) => commands::render::run(&options),
         Some(args::Command::Compare(options)) => commands::compare::run(&options),
         Some(args::Command::Retone(options)) => commands::retone::run(&options),
+        Some(args::Command::Doctor(options)) => commands::doctor::run(&options),
         None => commands::render::run(&cli.render),
     }
 }

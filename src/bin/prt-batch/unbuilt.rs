@@ -25,14 +25,12 @@ const OPTIONS: &[(&str, bool)] = &[
     ("transparent", false),
     ("texture-lod", false),
     ("config", true),
-    ("memory", true),
-    ("explain", false),
     ("strict", false),
     ("display", true),
 ];
 
 /// Commands.
-const COMMANDS: &[&str] = &["bench", "verify", "doctor"];
+const COMMANDS: &[&str] = &["bench", "verify"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {

@@ -21,11 +21,15 @@ pub fn run(args: &RenderArgs) -> ExitCode {
         tasks: BatchSettings::tasks_for(expand(&args.inputs), file_settings(args)),
         out: args.out.clone(),
         threads: args.threads,
+        memory: args.memory,
         force: args.force,
         report: !args.no_report,
         command: command_line(),
         ..BatchSettings::default()
     };
+    if args.explain {
+        return super::explain::run(&settings, args.json);
+    }
     let verbosity = match (args.quiet, args.verbose) {
         (true, _) => Verbosity::Quiet,
         (_, true) => Verbosity::Verbose,
@@ -103,7 +107,7 @@ fn camera_source(args: &RenderArgs) -> CameraSource {
 
 /// Where libembree4 may lie beside this program: an installation's folders, the project's when run from its target
 /// folder, and the current folder's.
-fn embree_dirs() -> Vec<PathBuf> {
+pub fn embree_dirs() -> Vec<PathBuf> {
     let mut dirs = Vec::new();
     if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
         dirs.extend([folder.join(".embree"), folder.join("../lib")]);
