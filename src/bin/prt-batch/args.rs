@@ -141,7 +141,7 @@ pub struct RenderArgs {
     /// Write no EXR
     #[arg(long)]
     pub no_exr: bool,
-    /// Write no index.html (which is not built yet); JSON is always written
+    /// Write no index.html; JSON is always written
     #[arg(long)]
     pub no_report: bool,
 
