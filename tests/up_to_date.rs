@@ -11,8 +11,8 @@ use prt::batch::names::NameTemplate;
 use prt::batch::report::{self, ImageReport, Status};
 use prt::batch::up_to_date::{Why, check};
 use prt::batch::{CameraSource, FileSettings, PictureSize, View};
-use prt::color::{ToneCurve, ToneMap};
-use prt::image::exr::ExrCompression;
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::{LoadOptions, load, obj::ObjUp};
 use prt::render::{AccelChoice, CropWindow, DefaultLight, Filter};
 use prt::scene::Scene;
@@ -331,12 +331,12 @@ fn what_changes_no_pixel_keeps_the_files() {
 
 #[test]
 fn how_files_are_made_of_pixels_changes_their_hash_alone() {
-    let edits: [(&str, Edit); 3] = [
-        ("exposure 0 -> 1.5", |s| s.settings.files.tone = ToneMap { exposure: 1.5, ..s.settings.files.tone }),
-        ("tonemap neutral -> srgb", |s| {
-            s.settings.files.tone = ToneMap { curve: ToneCurve::Srgb, ..s.settings.files.tone }
-        }),
-        ("exr-compression zip -> piz", |s| s.settings.files.compression = ExrCompression::Piz),
+    let edits: [(&str, Edit); 5] = [
+        ("exposure 0 -> 1.5", |s| s.settings.files.tone.exposure = Exposure::Stops(1.5)),
+        ("exposure 0 -> auto", |s| s.settings.files.tone.exposure = Exposure::Auto),
+        ("tonemap neutral -> srgb", |s| s.settings.files.tone.curve = ToneCurve::Srgb),
+        ("exr float -> half", |s| s.settings.files.format.samples = ExrSamples::Half),
+        ("exr-compression zip -> piz", |s| s.settings.files.format.compression = ExrCompression::Piz),
     ];
     for (says, edit) in edits {
         let mut shot = Shot::gltf().rendered();
@@ -351,7 +351,7 @@ fn how_files_are_made_of_pixels_changes_their_hash_alone() {
     let mut shot = Shot::gltf();
     shot.settings.files.png = false;
     let mut shot = shot.rendered();
-    shot.settings.files.tone.exposure = 1.0;
+    shot.settings.files.tone.exposure = Exposure::Stops(1.0);
     shot.check().expect("is up to date");
     shot.settings.files.png = true;
     assert_eq!(shot.why(), "no png was asked for the last time");
@@ -370,7 +370,8 @@ fn the_bytes_of_the_cameras_file_matter_and_not_its_path() {
 
 #[test]
 fn outputs_that_are_not_whole_are_found() {
-    let damage: [(&str, fn(&Path)); 4] = [
+    type Damage = fn(&Path);
+    let damage: [(&str, Damage); 4] = [
         ("is missing", |path| fs::remove_file(path).unwrap()),
         ("is damaged or was edited", |path| fs::write(path, &fs::read(path).unwrap()[1..]).unwrap()),
         ("is damaged or was edited", |path| flip(path, 3)),

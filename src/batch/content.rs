@@ -192,12 +192,13 @@ mod tests {
     #[test]
     fn a_file_that_was_just_written_is_not_kept_in_the_cache() {
         let (root, cache) = (tempfile::tempdir().unwrap(), HashCache::default());
-        let path = root.path().join("a");
-        // Same length, and as good as the same time.
-        for bytes in [b"one", b"two", b"six"] {
-            fs::write(&path, bytes).unwrap();
-            assert_eq!(cache.content(&path).unwrap().1, Content::of(bytes));
+        let (new, old) = (root.path().join("new"), root.path().join("old"));
+        aged(&new, b"one", 0);
+        aged(&old, b"one", 60);
+        for path in [&new, &old] {
+            assert_eq!(cache.content(path).unwrap().1, Content::of(b"one"));
         }
+        assert!(cache.known.lock().unwrap().keys().eq([&old]));
     }
 
     #[test]

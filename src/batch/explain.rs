@@ -1,14 +1,17 @@
 //! `--explain`: what a run would do with each image, found out without rendering or writing anything. Scenes are loaded
 //! and prepared, and a tenth of a second of paths is traced to tell how long the rest will take.
 
+use super::content::HashCache;
 use super::describe::{accel_name, default_light_name};
+use super::fingerprint::{CameraOrigin, Wanted};
 use super::job::{Plan, plan};
-use super::load_stage::guarded;
 use super::memory::{MemoryBudget, need};
+use super::panics::guarded;
 use super::report::{Accel, DefaultLight, Outputs};
 use super::run::{Stop, cameras_from_elsewhere, names_of, reported_name};
 use super::settings::{BatchSettings, FileSettings, Task};
 use super::size::{PictureSize, aspect_note, check_crop, size_for};
+use super::up_to_date::check;
 use super::view::CameraSource;
 use crate::camera::{Camera, Projection};
 use crate::light::Light;
@@ -19,6 +22,7 @@ use crate::scene::{Scene, Skipped};
 use crate::texture::{Image, Texels};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -44,7 +48,7 @@ pub struct Explanation {
     pub input: String,
     pub prospect: Prospect,
     pub problem: Option<String>,
-    /// Why the files on disk would be kept, or rendered again; null where nobody looked.
+    /// Why the files on disk would be kept or rendered again; null where nobody looked, as with `--force`.
     pub up_to_date: Option<String>,
     pub scene: Option<usize>,
     pub camera: Option<CameraPlan>,
@@ -188,19 +192,20 @@ impl Explained {
 /// # Errors
 /// What stops a run before anything is rendered, but for the output folder, which is not touched.
 pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> Result<Explained, Stop> {
-    let elsewhere = cameras_from_elsewhere(&settings.tasks).map_err(Stop::Usage)?;
+    let hashes = HashCache::default();
+    let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
     for Task { settings, .. } in &settings.tasks {
         if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
             check_crop(crop, width, height).map_err(Stop::Usage)?;
         }
     }
-    let names: Vec<_> = elsewhere.iter().map(|cameras| cameras.as_deref().map(names_of)).collect();
+    let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
     let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
     let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
     for (task, elsewhere) in elsewhere.iter().enumerate() {
-        let one = File { run: settings, plan: &plan, task, elsewhere: elsewhere.as_ref(), budget };
+        let one = File { run: settings, plan: &plan, task, elsewhere, hashes: &hashes, budget };
         let mut count = |explanation: Explanation| {
             explained.images += 1;
             explained.failing += usize::from(explanation.prospect == Prospect::Fail);
@@ -228,7 +233,8 @@ struct File<'a> {
     run: &'a BatchSettings,
     plan: &'a Plan,
     task: usize,
-    elsewhere: Option<&'a Arc<[Camera]>>,
+    elsewhere: &'a (Option<Arc<[Camera]>>, CameraOrigin),
+    hashes: &'a HashCache,
     budget: MemoryBudget,
 }
 
@@ -258,7 +264,7 @@ impl File<'_> {
         }
         let reading = self.budget.check_loading(&input.path, settings)?;
         let (mut scene, times) = load(&input.path, &settings.load).map_err(|error| error.to_string())?;
-        if let Some(cameras) = self.elsewhere {
+        if let Some(cameras) = &self.elsewhere.0 {
             settings.camera_source.replace(&mut scene, cameras);
         }
         Ok((scene, times, reading))
@@ -299,10 +305,30 @@ impl File<'_> {
                 fail(&mut plan, format!("{output} belongs to another input; use --name"));
             } else if let Err(problem) = self.image(scene, camera, reading, &mut prepared, &mut plan) {
                 fail(&mut plan, problem);
+            } else if !self.run.force && plan.prospect == Prospect::Render {
+                self.compare(camera, &mut plan);
             }
             all.push(plan);
         }
         all
+    }
+
+    /// Whether the files on disk are what a run would write.
+    fn compare(&self, camera: usize, plan: &mut Explanation) {
+        let wanted = Wanted {
+            input: &self.run.tasks[self.task].input.path,
+            settings: self.settings(),
+            origin: &self.elsewhere.1,
+            camera,
+        };
+        let json = plan.outputs.json.clone().unwrap_or_default();
+        plan.up_to_date = Some(match check(Path::new(&json), &wanted, self.hashes) {
+            Ok(_) => {
+                plan.prospect = Prospect::Keep;
+                "its files are what a run would write".into()
+            }
+            Err(why) => why.to_string(),
+        });
     }
 
     /// What a scene is, whoever looks at it.

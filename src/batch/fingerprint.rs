@@ -5,12 +5,14 @@
 //! no path, and nothing of this machine: equal inputs in another folder have the same fingerprint.
 
 use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
+use super::develop::Tone;
 use super::picture::FileOptions;
 use super::settings::FileSettings;
 use super::size::PictureSize;
 use super::view::{CameraSource, View};
 use crate::camera::Camera;
-use crate::color::ToneMap;
+use crate::color::Exposure;
+use crate::image::exr::ExrOptions;
 use crate::load::LoadOptions;
 use crate::render::{CropWindow, Filter, RenderSettings};
 use crate::scene::SourceFile;
@@ -212,14 +214,19 @@ impl Wanted<'_> {
 
 /// How the files that are asked for are made of the pixels.
 pub fn file_settings(files: &FileOptions) -> Settings {
-    let FileOptions { exr, png, compression, tone: ToneMap { exposure, curve } } = files;
+    let FileOptions { exr, png, format: ExrOptions { samples, compression }, tone: Tone { exposure, curve } } = files;
     let mut lines = Settings::new();
     if *exr {
-        lines.insert("exr".into(), "float".into());
+        lines.insert("exr".into(), name(samples));
         lines.insert("exr-compression".into(), name(compression));
     }
     if *png {
-        lines.insert("exposure".into(), exposure.to_string());
+        let exposure = match exposure {
+            Exposure::Stops(stops) => stops.to_string(),
+            // A function of the pixels.
+            Exposure::Auto => "auto".into(),
+        };
+        lines.insert("exposure".into(), exposure);
         lines.insert("tonemap".into(), name(curve));
     }
     lines

@@ -3,18 +3,22 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+mod budget;
 pub mod content;
 mod describe;
+mod develop;
 pub mod doctor;
 pub mod explain;
 pub mod fingerprint;
 pub mod host;
+pub mod html;
 pub mod input;
 pub mod job;
 mod load_stage;
 pub mod memory;
 pub mod names;
 pub mod output;
+pub mod panics;
 mod peek;
 mod picture;
 mod render_stage;
@@ -26,6 +30,7 @@ pub mod up_to_date;
 mod view;
 mod write_stage;
 
+pub use develop::{Developed, Tone, develop};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

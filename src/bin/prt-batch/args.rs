@@ -3,8 +3,8 @@
 use crate::parse::{self, ProgressStyle};
 use clap::{Args, Parser, Subcommand};
 use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
-use prt::color::ToneCurve;
-use prt::image::exr::ExrCompression;
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::path::PathBuf;
@@ -19,6 +19,7 @@ Examples:
   prt-batch a.glb --eye 3,2,5 --look-at 0,1,0  from a place of your own
   prt-batch scenes/*.gltf --json > result.json
   prt-batch compare renders/a.exr reference/a.exr --max-relmse 1e-3
+  prt-batch retone renders/ --tonemap agx --exposure auto
 
 Exit codes: 0 all rendered or empty; 1 some images failed; 2 usage; 3 every input was bad;
 4 outputs cannot be written.";
@@ -26,7 +27,9 @@ Exit codes: 0 all rendered or empty; 1 some images failed; 2 usage; 3 every inpu
 /// Path-traces glTF scenes on the CPU, in batches, to linear HDR EXR and tone-mapped PNG.
 #[derive(Debug, Parser)]
 #[command(version, about, after_help = EXAMPLES, args_conflicts_with_subcommands = true, max_term_width = 110)]
-#[command(override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF")]
+#[command(
+    override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF\n       prt-batch retone [OPTIONS] IN..."
+)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -40,6 +43,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Error metrics of pictures against a reference, of files or of folders.
     Compare(CompareArgs),
+    /// Tone-map stored EXRs again, no rendering.
+    Retone(RetoneArgs),
     /// What was found on this machine: processors, memory, Embree; and whether the ray backends work.
     Doctor(DoctorArgs),
 }
@@ -118,15 +123,15 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light)]
     pub default_light: DefaultLight,
 
-    /// Exposure of the PNG in stops
+    /// Exposure of the PNG in stops, or auto
     #[arg(long, value_name = "EV", default_value = "0", value_parser = parse::exposure, allow_hyphen_values = true)]
-    pub exposure: f64,
-    /// Tone curve of the PNG: neutral or srgb
+    pub exposure: Exposure,
+    /// Tone curve of the PNG: neutral, agx, aces or srgb
     #[arg(long, value_name = "CURVE", default_value = "neutral", value_parser = parse::tonemap)]
     pub tonemap: ToneCurve,
-    /// Sample type of the EXR: float
+    /// Sample type of the EXR: float or half
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = parse::exr)]
-    pub exr: &'static str,
+    pub exr: ExrSamples,
     /// Compression of the EXR: zip, zips, piz, rle or none; all are lossless
     #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression)]
     pub exr_compression: ExrCompression,
@@ -161,10 +166,10 @@ pub struct RenderArgs {
     /// Print the plan of each image, with what is skipped and why, memory and time; render nothing
     #[arg(long)]
     pub explain: bool,
-    /// Render even what is up to date (everything renders: keeping it is not built yet)
+    /// Render even what is up to date
     #[arg(long)]
     pub force: bool,
-    /// On stderr: auto (a bar on a terminal, else plain), plain (at most one line a second) or none
+    /// On stderr: auto (bars on a terminal, else plain), plain (at most one line a second), json or none
     #[arg(long, value_name = "STYLE", default_value = "auto", value_parser = parse::progress)]
     pub progress: ProgressStyle,
     /// Print the run's batch.json on stdout
@@ -206,4 +211,23 @@ pub struct CompareArgs {
     /// Print the result as JSON on stdout
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Args, Debug)]
+pub struct RetoneArgs {
+    /// EXR files; a folder means every `.exr` below it, its sub-folders kept under --out
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// Where the PNGs go [default: beside each EXR]
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Exposure in stops, or auto
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = parse::exposure, allow_hyphen_values = true)]
+    pub exposure: Exposure,
+    /// Tone curve: neutral, agx, aces or srgb
+    #[arg(long, value_name = "CURVE", default_value = "neutral", value_parser = parse::tonemap)]
+    pub tonemap: ToneCurve,
+    /// Say only what went wrong
+    #[arg(short, long)]
+    pub quiet: bool,
 }

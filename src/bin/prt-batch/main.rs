@@ -2,7 +2,9 @@
 
 mod args;
 mod commands;
+mod panics;
 mod parse;
+mod signals;
 mod term;
 mod unbuilt;
 
@@ -10,6 +12,10 @@ use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    panics::guarded(run)
+}
+
+fn run() -> ExitCode {
     let matches = unbuilt::add_to(args::Cli::command()).get_matches();
     if let Some(name) = unbuilt::asked_for(&matches) {
         return term::usage(&format!("{name} is not built yet; docs/cli.md says what is"));
@@ -22,6 +28,7 @@ fn main() -> ExitCode {
         Some(args::Command::Render(options)) => commands::render::run(&options),
         Some(args::Command::Compare(options)) => commands::compare::run(&options),
         Some(args::Command::Doctor(options)) => commands::doctor::run(&options),
+        Some(args::Command::Retone(options)) => commands::retone::run(&options),
         None => commands::render::run(&cli.render),
     }
 }

@@ -1,8 +1,8 @@
 //! Values of options: what is allowed, and what is of the contract but not built.
 
 use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
-use prt::color::ToneCurve;
-use prt::image::exr::ExrCompression;
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::str::FromStr;
@@ -132,20 +132,21 @@ pub fn integrator(value: &str) -> Result<&'static str, String> {
     word(value, &[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
 }
 
-pub fn exposure(value: &str) -> Result<f64, String> {
+pub fn exposure(value: &str) -> Result<Exposure, String> {
     if value == "auto" {
-        return Err("auto is not built yet; built: a number of stops".into());
+        return Ok(Exposure::Auto);
     }
     let inside = |stops: &f64| (-100.0..=100.0).contains(stops);
-    value.parse().ok().filter(inside).ok_or_else(|| "must be a number of stops from -100 to 100".into())
+    let stops = value.parse().ok().filter(inside).map(Exposure::Stops);
+    stops.ok_or_else(|| "must be auto or a number of stops from -100 to 100".into())
 }
 
 pub fn tonemap(value: &str) -> Result<ToneCurve, String> {
-    word(value, &[("neutral", ToneCurve::Neutral), ("srgb", ToneCurve::Srgb)], &["agx", "aces"])
+    word(value, &ToneCurve::NAMES, &[])
 }
 
-pub fn exr(value: &str) -> Result<&'static str, String> {
-    word(value, &[("float", "float")], &["half"])
+pub fn exr(value: &str) -> Result<ExrSamples, String> {
+    word(value, &[("float", ExrSamples::Float), ("half", ExrSamples::Half)], &[])
 }
 
 pub fn exr_compression(value: &str) -> Result<ExrCompression, String> {
@@ -158,12 +159,13 @@ pub fn exr_compression(value: &str) -> Result<ExrCompression, String> {
 pub enum ProgressStyle {
     Auto,
     Plain,
+    Json,
     None,
 }
 
 pub fn progress(value: &str) -> Result<ProgressStyle, String> {
-    use ProgressStyle::{Auto, None, Plain};
-    word(value, &[("auto", Auto), ("plain", Plain), ("none", None)], &["json"])
+    use ProgressStyle::{Auto, Json, None, Plain};
+    word(value, &[("auto", Auto), ("plain", Plain), ("json", Json), ("none", None)], &[])
 }
 
 pub fn name(value: &str) -> Result<NameTemplate, String> {

@@ -3,4 +3,6 @@
 pub mod compare;
 pub mod doctor;
 pub mod explain;
+mod exr_files;
 pub mod render;
+pub mod retone;

@@ -1,10 +1,11 @@
 //! `prt-batch INPUT...`
 
 use crate::args::RenderArgs;
+use crate::signals;
 use crate::term::{self, Reporter, Verbosity};
 use prt::batch::input::expand;
-use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, View};
-use prt::color::ToneMap;
+use prt::batch::{self, BatchSettings, CameraSource, FileOptions, FileSettings, PictureSize, Stop, Tone, View};
+use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
 use std::path::{Path, PathBuf};
@@ -35,9 +36,12 @@ pub fn run(args: &RenderArgs) -> ExitCode {
         _ => Verbosity::Normal,
     };
     let mut reporter = Reporter::new(args.progress, verbosity);
+    if let Err(error) = signals::install(&settings.cancel) {
+        term::warning(&format!("signals will end the process at once: {error}"));
+    }
     match batch::run(settings, &mut reporter) {
         Ok(outcome) => {
-            reporter.summary(&outcome);
+            reporter.summary(&outcome, &args.out);
             if args.json {
                 term::print(&batch::report::to_json(&outcome.report));
             }
@@ -82,8 +86,8 @@ fn file_settings(args: &RenderArgs) -> FileSettings {
         files: FileOptions {
             exr: !args.no_exr,
             png: !args.no_png,
-            compression: args.exr_compression,
-            tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
+            format: ExrOptions { samples: args.exr, compression: args.exr_compression },
+            tone: Tone { exposure: args.exposure, curve: args.tonemap },
         },
     }
 }
