@@ -371,7 +371,8 @@ impl File<'_> {
         let window = render::window(&render);
         let paths = u64::from(window.width) * u64::from(window.height) * u64::from(render.spp);
         plan.paths = Some(paths);
-        let need = need(scene, reading, &render, settings);
+        let threads = self.run.threads;
+        let need = need(scene, reading, &RenderSettings { threads, ..render.clone() }, settings);
         let budget = Some(self.budget.bytes).filter(|bytes| *bytes < u64::MAX);
         plan.memory = Some(MemoryPlan { peak: need.peak(), parts: need, budget });
         let fits = self.budget.check(&need, Some((window.width, window.height)));

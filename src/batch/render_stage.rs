@@ -154,7 +154,8 @@ impl RenderStage {
         let mut is_interrupted = false;
         let window = window(&settings);
         let fits = || {
-            let need = need(scene, reading, &settings, file);
+            let threads = self.shared.settings.threads;
+            let need = need(scene, reading, &RenderSettings { threads, ..settings.clone() }, file);
             self.shared.memory.check(&need, Some((window.width, window.height)))
         };
         let crop = settings.crop.map_or(Ok(()), |c| check_crop(c, settings.width, settings.height));
