@@ -48,7 +48,7 @@ pub struct Explanation {
     pub input: String,
     pub prospect: Prospect,
     pub problem: Option<String>,
-    /// Why the files on disk would be kept or rendered again; null where nobody looked, as with `--force`.
+    /// Why the files on disk would be kept, or rendered again; null where nobody looked.
     pub up_to_date: Option<String>,
     pub scene: Option<usize>,
     pub camera: Option<CameraPlan>,
@@ -204,8 +204,9 @@ pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> R
     let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
-    for (task, elsewhere) in elsewhere.iter().enumerate() {
-        let one = File { run: settings, plan: &plan, task, elsewhere, hashes: &hashes, budget };
+    for (task, (cameras, origin)) in elsewhere.iter().enumerate() {
+        let elsewhere = cameras.as_ref();
+        let one = File { run: settings, plan: &plan, task, elsewhere, origin, hashes: &hashes, budget };
         let mut count = |explanation: Explanation| {
             explained.images += 1;
             explained.failing += usize::from(explanation.prospect == Prospect::Fail);
@@ -233,7 +234,8 @@ struct File<'a> {
     run: &'a BatchSettings,
     plan: &'a Plan,
     task: usize,
-    elsewhere: &'a (Option<Arc<[Camera]>>, CameraOrigin),
+    elsewhere: Option<&'a Arc<[Camera]>>,
+    origin: &'a CameraOrigin,
     hashes: &'a HashCache,
     budget: MemoryBudget,
 }
@@ -264,7 +266,7 @@ impl File<'_> {
         }
         let reading = self.budget.check_loading(&input.path, settings)?;
         let (mut scene, times) = load(&input.path, &settings.load).map_err(|error| error.to_string())?;
-        if let Some(cameras) = &self.elsewhere.0 {
+        if let Some(cameras) = self.elsewhere {
             settings.camera_source.replace(&mut scene, cameras);
         }
         Ok((scene, times, reading))
@@ -305,30 +307,28 @@ impl File<'_> {
                 fail(&mut plan, format!("{output} belongs to another input; use --name"));
             } else if let Err(problem) = self.image(scene, camera, reading, &mut prepared, &mut plan) {
                 fail(&mut plan, problem);
-            } else if !self.run.force && plan.prospect == Prospect::Render {
-                self.compare(camera, &mut plan);
             }
+            self.look_for_earlier(camera, &mut plan);
             all.push(plan);
         }
         all
     }
 
-    /// Whether the files on disk are what a run would write.
-    fn compare(&self, camera: usize, plan: &mut Explanation) {
-        let wanted = Wanted {
-            input: &self.run.tasks[self.task].input.path,
-            settings: self.settings(),
-            origin: &self.elsewhere.1,
-            camera,
+    /// Whether an earlier run left what this one would write.
+    fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
+        let (input, settings) = (&self.run.tasks[self.task].input.path, self.settings());
+        let wanted = Wanted { input, settings, origin: self.origin, camera };
+        let json = match &plan.outputs.json {
+            Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
+            _ => return,
         };
-        let json = plan.outputs.json.clone().unwrap_or_default();
-        plan.up_to_date = Some(match check(Path::new(&json), &wanted, self.hashes) {
+        match check(Path::new(json), &wanted, self.hashes) {
             Ok(_) => {
                 plan.prospect = Prospect::Keep;
-                "its files are what a run would write".into()
+                plan.up_to_date = Some("its files are what a run would write".into());
             }
-            Err(why) => why.to_string(),
-        });
+            Err(why) => plan.up_to_date = Some(format!("no: {why}")),
+        }
     }
 
     /// What a scene is, whoever looks at it.
@@ -371,8 +371,7 @@ impl File<'_> {
         let window = render::window(&render);
         let paths = u64::from(window.width) * u64::from(window.height) * u64::from(render.spp);
         plan.paths = Some(paths);
-        let threads = self.run.threads;
-        let need = need(scene, reading, &RenderSettings { threads, ..render.clone() }, settings);
+        let need = need(scene, reading, &render, settings);
         let budget = Some(self.budget.bytes).filter(|bytes| *bytes < u64::MAX);
         plan.memory = Some(MemoryPlan { peak: need.peak(), parts: need, budget });
         let fits = self.budget.check(&need, Some((window.width, window.height)));

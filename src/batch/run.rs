@@ -3,9 +3,11 @@
 //! The thread that calls [`run()`] plans, tells its [`Observer`] what the others report, and ends them when it is asked
 //! to. Images are finished in the order of the plan.
 
+use super::budget::Budget;
 use super::content::HashCache;
 use super::describe::{accel_name, blank};
 use super::fingerprint::{CameraOrigin, Wanted};
+use super::html;
 use super::input::Input;
 use super::job::{Plan, plan};
 use super::load_stage::LoadStage;
@@ -97,10 +99,12 @@ pub(super) struct Shared {
     pub plan: Plan,
     /// For each task the cameras that it is to be seen by, if not by its own, and where they come from.
     pub elsewhere: Vec<(Option<Arc<[Camera]>>, CameraOrigin)>,
-    /// What no image may take more than.
-    pub memory: MemoryBudget,
     /// Contents of files that were hashed.
     pub hashes: HashCache,
+    /// Memory that may be used.
+    pub memory: MemoryBudget,
+    /// Who uses it.
+    pub budget: Arc<Budget>,
     /// Ends what is under way.
     pub stop: Arc<AtomicBool>,
     /// For what goes on beside rendering, whose own pool is busy.
@@ -213,8 +217,7 @@ const STACK: usize = 8 << 20;
 /// When one of the run's own threads does, which is a bug.
 pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let memory = MemoryBudget::new(settings.memory);
-    let hashes = HashCache::default();
+    let (hashes, memory) = (HashCache::default(), MemoryBudget::new(settings.memory));
     let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
     for Task { settings, .. } in &settings.tasks {
         if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
@@ -236,8 +239,9 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         settings,
         plan,
         elsewhere,
-        memory,
         hashes,
+        memory,
+        budget: Budget::new(memory.bytes),
         stop: Arc::default(),
         beside,
         next_id: AtomicU64::new(0),
@@ -277,8 +281,14 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         counts: Status::ALL.iter().map(|&status| (status, count(status))).collect(),
         images,
     };
-    if let Err(error) = write_atomic(&settings.out.join("batch.json"), report::to_json(&report).as_bytes()) {
-        unwritable.get_or_insert(error);
+    let mut files = vec![("batch.json", report::to_json(&report))];
+    if settings.report {
+        files.push(("index.html", html::report(&report, &settings.out)));
+    }
+    for (name, text) in files {
+        if let Err(error) = write_atomic(&settings.out.join(name), text.as_bytes()) {
+            unwritable.get_or_insert(error);
+        }
     }
     let strict = report.images.iter().filter(|image| !image.strict_failures().is_empty());
     let strict_failures = if settings.strict { strict.count() } else { 0 };

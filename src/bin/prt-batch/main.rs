@@ -27,8 +27,8 @@ fn run() -> ExitCode {
     match cli.command {
         Some(args::Command::Render(options)) => commands::render::run(&options),
         Some(args::Command::Compare(options)) => commands::compare::run(&options),
-        Some(args::Command::Doctor(options)) => commands::doctor::run(&options),
         Some(args::Command::Retone(options)) => commands::retone::run(&options),
+        Some(args::Command::Doctor(options)) => commands::doctor::run(&options),
         None => commands::render::run(&cli.render),
     }
 }
