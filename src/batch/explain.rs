@@ -423,7 +423,7 @@ impl File<'_> {
 
 /// Wall seconds a pixel that encoding and writing take, measured on one core of a server of 2023 (ZIP; noise compresses
 /// worst).
-const EXR_SECONDS: f64 = 120e-9;
+const EXR_SECONDS: f64 = 200e-9;
 const PNG_SECONDS: f64 = 60e-9;
 
 fn fail(plan: &mut Explanation, problem: String) {
