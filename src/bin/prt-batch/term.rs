@@ -29,6 +29,11 @@ pub fn error(text: &str) {
     say(&format!("error: {}", indented(text)));
 }
 
+/// Prints a warning to stderr.
+pub fn warning(text: &str) {
+    say(&format!("warning: {}", indented(text)));
+}
+
 /// `text` with every line after the first indented by two spaces, where it is not.
 fn indented(text: &str) -> String {
     let line =
