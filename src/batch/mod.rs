@@ -9,6 +9,7 @@ pub mod job;
 mod load_stage;
 pub mod names;
 pub mod output;
+mod pattern;
 mod peek;
 mod picture;
 mod render_stage;

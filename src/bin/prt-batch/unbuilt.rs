@@ -28,8 +28,8 @@ const OPTIONS: &[Unbuilt] = &[
         "Sampling",
         "target-error",
         "E",
-        "Stop when the upper end of the 95 % interval of the estimated relative error (sqrt of relMSE, below) is <= E \
-         [default: off]",
+        "Stop when the upper end of the 95 % interval of the estimated relative error (sqrt of relMSE, below) is <= E; \
+         with it or a time limit --spp is the most, by itself 2^20 [default: off]",
     ),
     option(
         "Sampling",
@@ -46,7 +46,7 @@ const OPTIONS: &[Unbuilt] = &[
         "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
     ),
     option("Sampling", "texture-lod", "", "Ray-cone level of detail (biased)"),
-    option("Light", "env", "FILE.hdr|.exr", "Equirectangular environment [default: none]"),
+    option("Light", "env", "FILE.hdr|.exr", "Equirectangular environment; with it --default-light auto is off [default: none]"),
     option("Light", "env-rotate", "DEG", "Its rotation, counter-clockwise about +Y seen from above [default: 0]"),
     option("Light", "env-scale", "S", "Factor on its radiance [default: 1]"),
     option(

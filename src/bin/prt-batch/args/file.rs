@@ -64,7 +64,7 @@ pub struct FileArgs {
     ///
     /// All of them, or the one that --camera names; nothing else of the file is read. A camera that is not to be had
     /// is a usage error (2).
-    #[arg(long, value_name = "FILE", help_heading = CAMERAS, value_hint = ValueHint::FilePath)]
+    #[arg(long, value_name = "FILE.gltf", help_heading = CAMERAS, value_hint = ValueHint::FilePath)]
     pub camera_from: Option<PathBuf>,
     /// A camera at this place, for every input and in place of its own; needs --look-at
     ///
@@ -88,8 +88,7 @@ pub struct FileArgs {
 
     /// Samples per pixel
     ///
-    /// From 1 to 2^20. The most, once --target-error and time limits are built; with one of them and without --spp it
-    /// will be 2^20.
+    /// From 1 to 2^20.
     #[arg(short, long, value_name = "N", default_value = "64", value_parser = parse::spp, help_heading = SAMPLING)]
     pub spp: u32,
     /// Same seed, same pixels
@@ -124,9 +123,9 @@ pub struct FileArgs {
 
     /// Built-in studio light
     ///
-    /// auto: on when the file has no punctual and no image-based light, no --env, what of it emits more than 1 nit
-    /// gives less than 0.02 lm per m^2 of all its surface, and less than half of its surface emits; figures and choice
-    /// are logged and recorded. Of a scene that has an environment of its own, that one is used.
+    /// auto: on when the file has no punctual and no image-based light, what of it emits more than 1 nit gives less
+    /// than 0.02 lm per m^2 of all its surface, and less than half of its surface emits; figures and choice are logged
+    /// and recorded. Of a scene that has an environment of its own, that one is used.
     #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light(), help_heading = LIGHT)]
     pub default_light: DefaultLight,
 

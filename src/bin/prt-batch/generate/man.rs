@@ -28,6 +28,14 @@ fn write(command: Command, page: &mut Vec<u8>) -> io::Result<()> {
         let section = String::from_utf8(section).expect("roff is text").replace(".SH ", ".SS ");
         page.extend(format!(".SH \"PRT\\-BATCH {}\"\n{about}\n{section}", sub.get_name().to_uppercase()).into_bytes());
     }
-    man.render_extra_section(page)?;
+    // Examples as they stand, not filled.
+    let examples = command.get_after_long_help().map(ToString::to_string).unwrap_or_default();
+    page.extend(format!(".SH EXAMPLES\n.nf\n{}.fi\n", escaped(&examples)).into_bytes());
     man.render_version_section(page)
+}
+
+/// Lines of text that roff leaves as they are.
+fn escaped(text: &str) -> String {
+    let line = |line: &str| format!("\\&{}\n", line.replace('\\', "\\e").replace('-', "\\-"));
+    text.lines().filter(|text| *text != "Examples:").map(line).collect()
 }

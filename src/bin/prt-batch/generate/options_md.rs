@@ -54,11 +54,11 @@ fn row(arg: &Arg) -> String {
         let names: Vec<_> = values.iter().map(|value| format!("`{}`", value.get_name())).collect();
         names.join(", ")
     };
-    let allowed = if built.is_empty() { String::new() } else { format!(": {}", list(&built)) };
+    let allowed = if built.is_empty() { String::new() } else { format!(". One of {}", list(&built)) };
     let state = match (arg.is_hide_set(), unbuilt.is_empty()) {
         (true, _) => "no".into(),
         (false, true) => "yes".into(),
-        (false, false) => format!("yes, but {}", list(&unbuilt)),
+        (false, false) => format!("yes; not {}", list(&unbuilt)),
     };
     let cells = [spelling(arg), prose(meaning.trim_end_matches('.')) + &allowed, prose(&default), state];
     format!("| {} |\n", cells.map(|cell| cell.replace('|', "\\|")).join(" | "))
@@ -95,10 +95,9 @@ fn split_default(help: &str) -> (String, Option<String>) {
 /// Options, templates, paths and file names in code font.
 fn prose(text: &str) -> String {
     let word = |word: &str| {
-        let core = word.trim_matches(['(', ')', ',', '.', ';', ':', '"']);
-        let is_code = core.starts_with("--") || core.starts_with('{') || core.contains("[[");
-        // What stands in a path's or a template's front is part of it.
-        match word.find(core).filter(|_| is_code && !core.is_empty()) {
+        let core = word.trim_start_matches(['(', '"']).trim_end_matches([')', ',', '.', ';', ':', '"']);
+        let is_code = ["--", "{", ".", "*"].iter().any(|start| core.starts_with(start)) || core == "?" || core.starts_with('[');
+        match word.find(core).filter(|_| is_code) {
             Some(at) => format!("{}`{core}`{}", &word[..at], &word[at + core.len()..]),
             None => word.to_owned(),
         }
