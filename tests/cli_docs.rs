@@ -14,11 +14,11 @@ fn printed(args: &[&str]) -> String {
 
 /// Long names in the lines of a help text that define options.
 fn options_of(help: &str) -> Vec<String> {
+    // `  -s, --spp` or `      --size`; what is further in is text.
     let name = |line: &str| {
-        let line = line.trim_start();
-        let at = line.find("--").filter(|at| *at == 0 || (*at == 4 && line.starts_with('-')))?;
-        let end = line[at + 2..].find([' ', '\n']).map_or(line.len(), |end| at + 2 + end);
-        Some(line[at..end].to_owned())
+        let option = line.strip_prefix("      ").or_else(|| line.strip_prefix("  -")?.split_once(", ").map(|(_, o)| o))?;
+        let end = option.find([' ', '=']).unwrap_or(option.len());
+        option.starts_with("--").then(|| option[..end].to_owned())
     };
     help.lines().filter_map(name).collect()
 }
@@ -78,7 +78,7 @@ fn bash_can_read_its_completions() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("completions");
     fs::write(&script, printed(&["--generate", "complete-bash"])).unwrap();
-    let complete = r#"source "$0"; COMP_WORDS=(prt-batch a.gltf --accel li); COMP_CWORD=3; _prt-batch prt-batch li --accel
+    let complete = r#"source "$0"; COMP_WORDS=(prt-batch a.gltf --accel li); COMP_CWORD=3; [[ $(complete -p prt-batch) =~ -F\ ([^ ]+) ]] && "${BASH_REMATCH[1]}" prt-batch li --accel
         echo "${COMPREPLY[*]}""#;
     match Command::new("bash").args(["-c", complete]).arg(&script).output() {
         Ok(output) => assert_eq!(String::from_utf8_lossy(&output.stdout), "linear\n", "{output:?}"),

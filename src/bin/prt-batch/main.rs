@@ -10,12 +10,19 @@ mod term;
 mod unbuilt;
 mod words;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches};
 use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let matches = unbuilt::add_to(args::Cli::command()).get_matches();
+    let matches = match unbuilt::add_to(args::Cli::command()).try_get_matches() {
+        Ok(matches) => matches,
+        Err(error) => match hyphen_file().filter(|_| error.kind() == ErrorKind::UnknownArgument) {
+            Some(file) => return term::usage(&format!("{file} is no option\n  For the file of that name write ./{file}.")),
+            None => error.exit(),
+        },
+    };
     if let Some(name) = unbuilt::asked_for(&matches) {
         let mut text = format!("{name} is not built yet; docs/cli.md says what is");
         if Path::new(&name).exists() {
@@ -36,4 +43,10 @@ fn main() -> ExitCode {
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),
     }
+}
+
+/// What was typed that begins with a hyphen and is a file.
+fn hyphen_file() -> Option<String> {
+    let typed = std::env::args_os().skip(1).map(|arg| arg.to_string_lossy().into_owned());
+    typed.filter(|arg| arg.starts_with('-') && arg.len() > 1).find(|arg| Path::new(arg).exists())
 }

@@ -168,8 +168,11 @@ impl Reader<'_> {
         if name == "config" {
             return Err(format!("{at}: a config file cannot name another"));
         }
-        let source = &self.text[value.span()];
-        let shown = format!("{at}: {name} = {}", source.lines().next().unwrap_or_default());
+        let shown = match value.get_ref() {
+            // Its keys may stand anywhere.
+            DeValue::Table(_) => format!("{at}: {name}"),
+            _ => format!("{at}: {name} = {}", self.text[value.span()].lines().next().unwrap_or_default()),
+        };
         let typed = value::typed(arg, value.get_ref()).map_err(|why| format!("{shown}\n  {why}"))?;
         let args = typed.map(|typed| match typed {
             None => OsString::from(format!("--{name}")),
