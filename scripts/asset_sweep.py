@@ -81,7 +81,8 @@ def files(root):
 def render(binary, path, out, size, spp, more):
     """Renders one file; its image report, and what the process said."""
     command = [binary, path, "--out", out, "--size", f"{size}x{size}", "--spp", str(spp), "--camera", "0", "--json",
-               "--progress", "none", "--no-exr", *more]
+               "--progress", "none", "--no-exr", "--force", *more]
+    # --force: it is the program that has changed since the last sweep, not the files.
     start = time.time()
     try:
         done = subprocess.run(command, capture_output=True, timeout=TIMEOUT)

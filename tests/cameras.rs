@@ -4,7 +4,7 @@ mod support;
 
 use glam::{DMat4, DQuat, DVec3};
 use prt::camera::{Camera, Projection, look_at};
-use prt::image::exr::{ExrCamera, ExrCompression, ExrPicture, ExrProjection, encode};
+use prt::image::exr::{ExrCamera, ExrOptions, ExrPicture, ExrProjection, encode};
 use prt::material::Material;
 use prt::render::{AccelChoice, Filter, Frame, Progress, RenderSettings, render};
 use prt::scene::{Scene, SceneBuilder};
@@ -71,7 +71,7 @@ fn by_exr(frame: &Frame, p: DVec3) -> (f64, f64) {
     let size = [WIDTH, HEIGHT];
     let picture =
         ExrPicture { display_size: size, origin: [0, 0], size, pixels: &frame.pixels, camera, attributes: Vec::new() };
-    let bytes = encode(&picture, ExrCompression::Zip).expect("a whole picture");
+    let bytes = encode(&picture, ExrOptions::default()).expect("a whole picture");
     let meta = exr::meta::MetaData::read_from_buffered(std::io::Cursor::new(bytes), false).expect("a header");
     let m = meta.headers[0].own_attributes.world_to_normalized_device.expect("worldToNDC");
     let row = [p.x, p.y, p.z, 1.0];

@@ -1,6 +1,6 @@
 //! `prt-batch compare` as scripts meet it: exit codes and messages, on pictures made here.
 
-use prt::image::exr::{ExrCamera, ExrCompression, ExrPicture, ExrProjection, encode};
+use prt::image::exr::{ExrCamera, ExrOptions, ExrPicture, ExrProjection, encode};
 use std::path::Path;
 use std::process::Command;
 
@@ -21,7 +21,7 @@ fn write(path: &Path, origin: [u32; 2], size: [u32; 2], value: impl Fn(u32, u32)
     let picture =
         ExrPicture { display_size: [SIZE, SIZE], origin, size, pixels: &pixels, camera, attributes: Vec::new() };
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
-    std::fs::write(path, encode(&picture, ExrCompression::Zip).unwrap()).unwrap();
+    std::fs::write(path, encode(&picture, ExrOptions::default()).unwrap()).unwrap();
 }
 
 fn whole(path: &Path, value: impl Fn(u32, u32) -> f32) {

@@ -1,14 +1,18 @@
 //! Reads scenes, one ahead of the one that is rendered.
 
+use super::content::{InputRecord, hash_sources};
+use super::panics::guarded;
 use super::render_stage::Loaded;
-use super::run::{Event, Shared, names_of};
+use super::report::ImageReport;
+use super::run::{Event, ImageId, Shared, names_of};
 use super::settings::Task;
+use super::up_to_date::Why;
 use crate::load::{LoadTimes, load};
-use crate::scene::Scene;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use crate::render::Progress;
+use crate::scene::{Scene, SourceFile};
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::mpsc::{Sender, SyncSender};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Instant;
 
 /// The thread that reads.
@@ -17,14 +21,55 @@ pub(super) struct LoadStage {
     pub events: Sender<Event>,
 }
 
+/// What is to be done for a file.
+pub(super) enum Contents {
+    /// Nothing: all of its images are up to date. Each with its id and its progress.
+    Kept(Vec<(ImageId, Arc<Progress>, Box<ImageReport>)>),
+    /// To render it.
+    Scene(Box<SceneFile>),
+}
+
 /// A file that was read.
-pub(super) struct Contents {
+pub(super) struct SceneFile {
     pub scene: Scene,
+    pub sources: Arc<Sources>,
     pub times: LoadTimes,
     /// Of the scene's cameras, in order.
     pub names: Vec<String>,
     /// Which of them to render.
     pub chosen: Vec<usize>,
+    /// Why not all of its images are up to date; empty if nobody asked.
+    pub why: String,
+}
+
+/// What the files hold that a scene was made from: hashed while it is rendered.
+pub(super) struct Sources {
+    hashing: Mutex<Option<Receiver<Hashed>>>,
+    hashed: OnceLock<Hashed>,
+}
+
+type Hashed = Result<Vec<InputRecord>, String>;
+
+impl Sources {
+    fn hash(shared: &Arc<Shared>, sources: Vec<SourceFile>) -> Arc<Self> {
+        let (done, hashing) = channel();
+        let with_cache = Arc::clone(shared);
+        shared.beside.spawn(move || {
+            let hashed = hash_sources(&sources, &with_cache.hashes).map_err(|changed| changed.to_string());
+            // Nobody waits for it when the run was ended.
+            let _ = done.send(hashed);
+        });
+        Arc::new(Self { hashing: Mutex::new(Some(hashing)), hashed: OnceLock::new() })
+    }
+
+    /// Waits for the hashes. The error says what changed while it was read.
+    pub fn records(&self) -> &Hashed {
+        self.hashed.get_or_init(|| {
+            let hashing = self.hashing.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let hashed = hashing.and_then(|hashing| hashing.recv().ok());
+            hashed.unwrap_or_else(|| Err("the files that were read could not be hashed".into()))
+        })
+    }
 }
 
 impl LoadStage {
@@ -42,11 +87,19 @@ impl LoadStage {
         let shared = &*self.shared;
         let Task { input, settings } = &shared.settings.tasks[task];
         let planned = settings.cameras.select(&shared.plan.cameras[task]).unwrap_or_else(|_| vec![0]);
-        let outputs = shared.plan.namings[task].outputs(&shared.plan.cameras[task], &planned[..1]);
-        let first: PathBuf = outputs.into_iter().next().unwrap_or_default();
-        let (id, progress) = shared.start(&self.events, task, &first);
+        let outputs = shared.plan.namings[task].outputs(&shared.plan.cameras[task], &planned);
+        let (id, progress) = shared.start(&self.events, task, &outputs[0]);
         progress.enter(crate::render::Phase::Loading);
         let clock = Instant::now();
+        let why = match self.kept(task, &planned, &outputs) {
+            Ok(reports) => {
+                let later = |output: &PathBuf| shared.start(&self.events, task, output);
+                let ids = std::iter::once((id, Arc::clone(&progress))).chain(outputs[1..].iter().map(later));
+                let kept = ids.zip(reports).map(|((id, progress), report)| (id, progress, report)).collect();
+                return Loaded { task, id, progress, contents: Ok(Contents::Kept(kept)), seconds: 0.0 };
+            }
+            Err(why) => why,
+        };
         let loaded = match &input.problem {
             Some(problem) => Err(problem.to_string()),
             None => {
@@ -55,23 +108,28 @@ impl LoadStage {
             }
         };
         let contents = loaded.and_then(|(mut scene, times)| {
-            if let Some(cameras) = &shared.elsewhere[task] {
+            if let Some(cameras) = &shared.elsewhere[task].0 {
                 settings.camera_source.replace(&mut scene, cameras);
             }
             let names = names_of(&scene.cameras);
             let chosen = settings.cameras.select(&names);
             let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;
-            Ok(Contents { scene, times, names, chosen })
+            let sources = Sources::hash(&self.shared, std::mem::take(&mut scene.sources));
+            Ok(Contents::Scene(Box::new(SceneFile { scene, sources, times, names, chosen, why })))
         });
         Loaded { task, id, progress, contents, seconds: clock.elapsed().as_secs_f64() }
     }
-}
 
-/// Runs `work`; a panic in it becomes an error, so that the batch goes on.
-pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
-        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
-        let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-        Err(format!("internal error: {text}\n  This is a bug in prt-batch, please report it with the file."))
-    })
+    /// The reports of all images of the task if all are up to date; else why not, empty if that needs no saying.
+    fn kept(&self, task: usize, cameras: &[usize], outputs: &[PathBuf]) -> Result<Vec<Box<ImageReport>>, String> {
+        if self.shared.settings.force || self.shared.settings.tasks[task].input.problem.is_some() {
+            return Err(String::new());
+        }
+        let images = cameras.iter().zip(outputs);
+        images.map(|(&camera, output)| self.shared.kept(task, camera, output)).collect::<Result<_, _>>().map_err(
+            |why| {
+                if why == Why::New { String::new() } else { why.to_string() }
+            },
+        )
+    }
 }

@@ -3,12 +3,18 @@
 //!
 //! One bad file does not stop the others; clashing names are refused before anything is rendered.
 
+mod budget;
+pub mod content;
 mod describe;
+mod develop;
+pub mod fingerprint;
+pub mod html;
 pub mod input;
 pub mod job;
 mod load_stage;
 pub mod names;
 pub mod output;
+pub mod panics;
 mod pattern;
 mod peek;
 mod picture;
@@ -17,9 +23,11 @@ pub mod report;
 mod run;
 mod settings;
 mod size;
+pub mod up_to_date;
 mod view;
 mod write_stage;
 
+pub use develop::{Developed, Tone, develop};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

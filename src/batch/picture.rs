@@ -1,39 +1,44 @@
 //! A [`Frame`] as the bytes of files.
 
+use super::develop::Tone;
 use crate::camera::Projection;
-use crate::color::ToneMap;
-use crate::image::exr::{self, ExrCamera, ExrCompression, ExrPicture, ExrProjection, ExrValue};
-use crate::image::png;
+use crate::image::exr::{self, ExrCamera, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue};
 use crate::render::{Brdf, Frame, RenderSettings};
 
 /// Which files, and how.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FileOptions {
     /// Write the EXR.
     pub exr: bool,
     /// Write the PNG.
     pub png: bool,
     /// Of the EXR.
-    pub compression: ExrCompression,
+    pub format: ExrOptions,
     /// Of the PNG.
-    pub tone: ToneMap,
+    pub tone: Tone,
 }
 
 impl Default for FileOptions {
     fn default() -> Self {
-        Self { exr: true, png: true, compression: ExrCompression::default(), tone: ToneMap::default() }
+        Self { exr: true, png: true, format: ExrOptions::default(), tone: Tone::default() }
     }
 }
 
-/// The bytes of the EXR.
+/// The bytes of the EXR, and how many of its pixels were clipped; `None` where nothing clips. `fingerprint` is that of
+/// its pixels ([`super::fingerprint::Fingerprint::pixels`]), if known.
 ///
 /// # Errors
 /// See [`exr::encode`].
 pub(super) fn exr_bytes(
     frame: &Frame,
     settings: &RenderSettings,
-    compression: ExrCompression,
-) -> Result<Vec<u8>, String> {
+    options: ExrOptions,
+    fingerprint: Option<&str>,
+) -> Result<(Vec<u8>, Option<u64>), String> {
+    let clipped = match options.samples {
+        ExrSamples::Float => None,
+        ExrSamples::Half => Some(exr::clipped_by_half(&frame.pixels)),
+    };
     let window = frame.window;
     let camera = ExrCamera {
         world_from_camera: frame.camera.world_from_camera,
@@ -49,26 +54,19 @@ pub(super) fn exr_bytes(
         size: [window.width, window.height],
         pixels: &frame.pixels,
         camera,
-        attributes: attributes(frame, settings),
+        attributes: attributes(frame, settings, clipped, fingerprint),
     };
-    exr::encode(&picture, compression)
-}
-
-/// The bytes of the PNG, and how many channels of its pixels were NaN.
-pub(super) fn png_bytes(frame: &Frame, tone: &ToneMap) -> (Vec<u8>, u64) {
-    let mut nan_channels = 0;
-    let mut rgb = Vec::with_capacity(frame.pixels.len() * 3);
-    for &radiance in &frame.pixels {
-        let (color, nan) = tone.apply(radiance);
-        rgb.extend_from_slice(&color);
-        nan_channels += u64::from(nan);
-    }
-    (png::encode(&rgb, frame.window.width, frame.window.height), nan_channels)
+    Ok((exr::encode(&picture, options)?, clipped))
 }
 
 /// The `prt:` attributes. Only what determines the pixels, so that equal renders have equal bytes: no times, paths,
 /// host, threads.
-fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, ExrValue)> {
+fn attributes(
+    frame: &Frame,
+    settings: &RenderSettings,
+    clipped: Option<u64>,
+    fingerprint: Option<&str>,
+) -> Vec<(&'static str, ExrValue)> {
     let stats = &frame.stats;
     let mut attributes = vec![
         ("prt:version", ExrValue::Text(crate::VERSION.into())),
@@ -83,11 +81,12 @@ fn attributes(frame: &Frame, settings: &RenderSettings) -> Vec<(&'static str, Ex
         ("prt:light", ExrValue::Text(light_name(frame).into())),
         ("prt:nonFinite", ExrValue::Double(stats.non_finite_samples as f64)),
         ("prt:truncated", ExrValue::Double(stats.truncated)),
-        ("prt:biased", ExrValue::Text(bias_of(frame, settings))),
+        ("prt:biased", ExrValue::Text(bias_of(frame, settings, clipped))),
     ];
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }
+    attributes.extend(fingerprint.map(|hash| ("prt:fingerprint", ExrValue::Text(hash.into()))));
     attributes
 }
 
@@ -104,7 +103,7 @@ fn light_name(frame: &Frame) -> &'static str {
 }
 
 /// What biases the picture and why; `no` if nothing does.
-fn bias_of(frame: &Frame, settings: &RenderSettings) -> String {
+fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> String {
     let mut reasons = Vec::new();
     if let Some(bounces) = settings.max_bounces {
         reasons.push(format!("paths end after {bounces} scatterings (--max-bounces)"));
@@ -115,6 +114,9 @@ fn bias_of(frame: &Frame, settings: &RenderSettings) -> String {
     }
     if frame.stats.non_finite_samples > 0 {
         reasons.push(format!("{} non-finite samples were dropped", frame.stats.non_finite_samples));
+    }
+    if let Some(clipped) = clipped.filter(|clipped| *clipped > 0) {
+        reasons.push(format!("{clipped} pixels were clipped at 65504 (--exr half)"));
     }
     if reasons.is_empty() { "no".into() } else { reasons.join("; ") }
 }
@@ -143,32 +145,48 @@ mod tests {
     #[test]
     fn files_hold_the_window_of_the_frame() {
         let frame = frame();
-        let bytes = exr_bytes(&frame, &RenderSettings::default(), ExrCompression::Zip).unwrap();
+        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), ExrOptions::default(), None).unwrap();
+        assert_eq!(clipped, None);
         let read = exr_read::decode(&bytes).unwrap();
         assert_eq!((read.origin, read.width, read.height), ([3, 2], 2, 1));
         assert_eq!(read.pixels[0], frame.pixels[0]);
-        let (png, nan) = png_bytes(&frame, &ToneMap::default());
-        assert_eq!(nan, 1);
-        let png = image::load_from_memory(&png).unwrap().into_rgb8();
-        assert_eq!((png.width(), png.height()), (2, 1));
+    }
+
+    #[test]
+    fn pixels_that_half_clips_are_counted_and_named() {
+        let mut frame = frame();
+        let half = ExrOptions { samples: ExrSamples::Half, ..ExrOptions::default() };
+        let (bytes, clipped) = exr_bytes(&frame, &RenderSettings::default(), half, None).unwrap();
+        assert_eq!(clipped, Some(1));
+        assert_eq!(exr_read::decode(&bytes).unwrap().pixels[1][1], 65504.0);
+        let named = "1 pixels were clipped at 65504 (--exr half)";
+        assert!(bytes.windows(named.len()).any(|window| window == named.as_bytes()));
+        frame.pixels[1] = [65504.0, 0.1, -65504.0];
+        assert_eq!(exr_bytes(&frame, &RenderSettings::default(), half, None).unwrap().1, Some(0));
+        assert_eq!(bias_of(&frame, &RenderSettings::default(), Some(0)), "no");
     }
 
     #[test]
     fn attributes_are_those_of_the_contract() {
-        let names: Vec<_> = attributes(&frame(), &RenderSettings::default()).iter().map(|a| a.0).collect();
+        let names = |fingerprint| -> Vec<_> {
+            attributes(&frame(), &RenderSettings::default(), None, fingerprint).iter().map(|a| a.0).collect()
+        };
         #[rustfmt::skip]
-        assert_eq!(names, ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
+        assert_eq!(names(None), ["prt:version", "prt:seed", "prt:spp", "prt:accel", "prt:integrator", "prt:brdf",
             "prt:normals", "prt:light", "prt:nonFinite", "prt:truncated", "prt:biased"]);
+        let with_fingerprint = names(Some("0123"));
+        assert_eq!(with_fingerprint[..11], names(None));
+        assert_eq!(with_fingerprint[11..], ["prt:fingerprint"]);
     }
 
     #[test]
     fn bias_is_named() {
         let (mut frame, mut settings) = (frame(), RenderSettings::default());
-        assert_eq!(bias_of(&frame, &settings), "no");
+        assert_eq!(bias_of(&frame, &settings, None), "no");
         settings.max_bounces = Some(3);
         frame.stats.non_finite_samples = 7;
         assert_eq!(
-            bias_of(&frame, &settings),
+            bias_of(&frame, &settings, None),
             "paths end after 3 scatterings (--max-bounces); 7 non-finite samples were dropped"
         );
     }

@@ -1,12 +1,13 @@
 //! Renders the scenes that were read.
 
 use super::describe::{blank, describe};
-use super::load_stage::{Contents, guarded};
+use super::load_stage::{Contents, SceneFile};
+use super::panics::guarded;
 use super::report::{ImageReport, Status};
 use super::run::{Event, ImageId, Shared, reported_name};
 use super::settings::Task;
 use super::size::{aspect_note, check_crop, size_for};
-use super::write_stage::Made;
+use super::write_stage::{Made, Picture};
 use crate::error::RenderError;
 use crate::render::{Frame, Progress, RenderSettings, render};
 use crate::scene::Scene;
@@ -57,8 +58,17 @@ impl RenderStage {
         let Task { input, settings } = &self.shared.settings.tasks[task];
         let naming = &self.shared.plan.namings[task];
         let image = || Box::new(blank(&input.path, settings));
-        let Contents { scene, times, names, chosen } = match contents {
-            Ok(contents) => contents,
+        let SceneFile { scene, sources, times, names, chosen, why } = match contents {
+            Ok(Contents::Scene(file)) => *file,
+            Ok(Contents::Kept(images)) => {
+                for (id, progress, image) in images {
+                    self.hand_on(
+                        Made { task, id, progress, image, output: None, picture: None, is_bad_input: false },
+                        to_write,
+                    )?;
+                }
+                return Ok(());
+            }
             Err(message) => {
                 let mut image = image();
                 fail(&mut image, message);
@@ -66,7 +76,7 @@ impl RenderStage {
                 // A pattern or a folder has no name of its own to write under.
                 let output = input.problem.is_none().then(|| naming.output("0", false));
                 return self
-                    .hand_on(Made { task, id, progress, image, output, frame: None, is_bad_input: true }, to_write);
+                    .hand_on(Made { task, id, progress, image, output, picture: None, is_bad_input: true }, to_write);
             }
         };
         let outputs = naming.outputs(&names, &chosen);
@@ -85,15 +95,29 @@ impl RenderStage {
             image.warnings.clone_from(&scene.warnings);
             image.losses.clone_from(&scene.losses);
             image.skipped.clone_from(&scene.skipped);
-            let mut made = Made { task, id, progress, image, output: None, frame: None, is_bad_input: false };
+            image.why.clone_from(&why);
+            let mut made = Made { task, id, progress, image, output: None, picture: None, is_bad_input: false };
             // Names that were guessed before loading are known now.
             if self.shared.plan.owners.get(&output).is_some_and(|owner| *owner != task) {
                 let (path, output) = (input.path.display(), output.display());
                 fail(&mut made.image, format!("{path}: {output} belongs to another input; use --name"));
             } else {
+                // Of several images some may be up to date.
+                if chosen.len() > 1
+                    && !self.shared.settings.force
+                    && let Ok(image) = self.shared.kept(task, camera, &output)
+                {
+                    made.image = image;
+                    self.hand_on(made, to_write)?;
+                    continue;
+                }
                 made.output = Some(output);
                 match self.image(task, &scene, camera, &made.progress, &mut made.image) {
-                    Ok(frame) => made.frame = frame.map(Box::new),
+                    Ok(frame) => {
+                        made.picture = frame.map(|(frame, settings)| {
+                            Box::new(Picture { frame, settings, camera, sources: Arc::clone(&sources) })
+                        });
+                    }
                     Err(Interrupted) => return Err(Ended),
                 }
             }

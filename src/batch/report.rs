@@ -1,6 +1,8 @@
 //! What happened, as JSON: one document per image and `batch.json` for the run. A field whose feature is not built is
 //! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
 
+use super::fingerprint::Fingerprint;
+use crate::color::Exposure;
 use crate::scene::Skipped;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -52,6 +54,10 @@ pub struct ImageReport {
     pub truncated: Option<f64>,
     /// Not built (`--clamp`).
     pub energy_clamped: Option<f64>,
+    /// Null where the EXR's samples clip nothing.
+    pub clipped_pixels: Option<u64>,
+    /// Null without a PNG.
+    pub exposure: Option<ExposureReport>,
     pub peak_rss_bytes: Option<u64>,
     pub triangles: Option<u64>,
     pub instances: Option<u64>,
@@ -62,6 +68,11 @@ pub struct ImageReport {
     pub warnings: Vec<String>,
     /// Those of `warnings` that mean that something of the file is not in the picture: `--strict` fails on them.
     pub losses: Vec<String>,
+    /// What it was made from; `None`: that is not known, and it will not be taken for up to date.
+    pub fingerprint: Option<Fingerprint>,
+    /// Why it was not taken for up to date; said to the user who asks for details, not part of the JSON.
+    #[serde(skip)]
+    pub why: String,
     /// Why `auto` did not take Embree; said to the user once, not part of the JSON.
     #[serde(skip)]
     pub accel_note: String,
@@ -112,6 +123,34 @@ pub struct DefaultLight {
     pub used: bool,
     pub emitted_lm_per_m2: f64,
     pub glowing_share: f64,
+}
+
+/// The exposure of the PNG.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct ExposureReport {
+    pub requested: RequestedExposure,
+    pub used: f64,
+}
+
+/// Stops, or `auto`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+#[expect(missing_docs, reason = "the variants are the JSON's, described in docs/cli.md")]
+pub enum RequestedExposure {
+    Stops(f64),
+    Word(String),
+}
+
+impl ExposureReport {
+    /// What was asked for and the stops that it became.
+    pub fn new(requested: Exposure, used: f64) -> Self {
+        let requested = match requested {
+            Exposure::Stops(stops) => RequestedExposure::Stops(stops),
+            Exposure::Auto => RequestedExposure::Word("auto".into()),
+        };
+        Self { requested, used }
+    }
 }
 
 /// Wall seconds of the image's own work; null where it did not come to that.
@@ -221,6 +260,18 @@ mod tests {
     fn statuses_are_written_as_in_the_contract() {
         let names = Status::ALL.map(|s| serde_json::to_value(s).unwrap().as_str().unwrap().to_owned());
         assert_eq!(names, ["rendered", "up-to-date", "empty", "failed", "interrupted"]);
+    }
+
+    #[test]
+    fn exposures_are_a_number_or_auto_and_read_back() {
+        for (requested, json) in [
+            (Exposure::Stops(-1.5), r#"{"requested":-1.5,"used":2.0}"#),
+            (Exposure::Auto, r#"{"requested":"auto","used":2.0}"#),
+        ] {
+            let report = ExposureReport::new(requested, 2.0);
+            assert_eq!(serde_json::to_string(&report).unwrap(), json);
+            assert_eq!(serde_json::from_str::<ExposureReport>(json).unwrap(), report);
+        }
     }
 
     #[cfg(target_os = "linux")]

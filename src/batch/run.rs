@@ -3,15 +3,18 @@
 //! The thread that calls [`run()`] plans, tells its [`Observer`] what the others report, and ends them when it is asked
 //! to. Images are finished in the order of the plan.
 
+use super::content::HashCache;
 use super::describe::{accel_name, blank};
+use super::fingerprint::{CameraOrigin, Wanted};
 use super::input::Input;
 use super::job::{Plan, plan};
 use super::load_stage::LoadStage;
 use super::output::{WriteError, check_writable, sweep, write_atomic};
 use super::render_stage::RenderStage;
-use super::report::{self, Accel, BatchReport, Host, ImageReport, Status};
+use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Status};
 use super::settings::{BatchSettings, FileSettings, Task};
 use super::size::{PictureSize, check_crop};
+use super::up_to_date::{Kept, Why, check};
 use super::write_stage::WriteStage;
 use crate::camera::Camera;
 use crate::render::{Progress, pool};
@@ -91,8 +94,10 @@ impl Outcome {
 pub(super) struct Shared {
     pub settings: BatchSettings,
     pub plan: Plan,
-    /// For each task the cameras that it is to be seen by, if not by its own.
-    pub elsewhere: Vec<Option<Arc<[Camera]>>>,
+    /// For each task the cameras that it is to be seen by, if not by its own, and where they come from.
+    pub elsewhere: Vec<(Option<Arc<[Camera]>>, CameraOrigin)>,
+    /// Contents of files that were hashed.
+    pub hashes: HashCache,
     /// Ends what is under way.
     pub stop: Arc<AtomicBool>,
     /// For what goes on beside rendering, whose own pool is busy.
@@ -128,6 +133,36 @@ impl Shared {
             progress: Arc::clone(&progress),
         }));
         (id, progress)
+    }
+
+    /// What is asked for of a task's camera.
+    pub fn wanted(&self, task: usize, camera: usize) -> Wanted<'_> {
+        let Task { input, settings } = &self.settings.tasks[task];
+        Wanted { input: &input.path, settings, origin: &self.elsewhere[task].1, camera }
+    }
+
+    /// The image as an earlier run left it, if that is what this run would write; else why not.
+    pub fn kept(&self, task: usize, camera: usize, output: &Path) -> Result<Box<ImageReport>, Why> {
+        let json = self.path(output, "json");
+        let Kept { report, outputs } = check(&json, &self.wanted(task, camera), &self.hashes)?;
+        let path = |kind: &str| {
+            let of_kind = outputs.iter().find(|path| path.extension().is_some_and(|e| e == kind));
+            of_kind.map(|path| path.display().to_string())
+        };
+        Ok(Box::new(ImageReport {
+            status: Status::UpToDate,
+            input: self.settings.tasks[task].input.path.display().to_string(),
+            outputs: Outputs { exr: path("exr"), png: path("png"), json: Some(json.display().to_string()) },
+            ..report
+        }))
+    }
+
+    /// `<out>/<output>.<extension>`.
+    pub fn path(&self, output: &Path, extension: &str) -> PathBuf {
+        let mut name = self.settings.out.join(output).into_os_string();
+        name.push(".");
+        name.push(extension);
+        name.into()
     }
 
     fn gate(&self) -> MutexGuard<'_, Gate> {
@@ -175,13 +210,14 @@ const STACK: usize = 8 << 20;
 /// When one of the run's own threads does, which is a bug.
 pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let elsewhere = cameras_from_elsewhere(&settings.tasks).map_err(Stop::Usage)?;
+    let hashes = HashCache::default();
+    let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
     for Task { settings, .. } in &settings.tasks {
         if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
             check_crop(crop, width, height).map_err(Stop::Usage)?;
         }
     }
-    let names: Vec<_> = elsewhere.iter().map(|cameras| cameras.as_deref().map(names_of)).collect();
+    let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
     let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
     let threads = |error: crate::error::RenderError| Stop::Usage(format!("--threads: {error}"));
     let (rendering, beside) = (pool(settings.threads).map_err(threads)?, pool(settings.threads).map_err(threads)?);
@@ -195,6 +231,7 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         settings,
         plan,
         elsewhere,
+        hashes,
         stop: Arc::default(),
         beside,
         next_id: AtomicU64::new(0),
@@ -243,22 +280,26 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
 }
 
 /// The cameras that each task is to be seen by, if not by its own; read once for all tasks that share settings.
-fn cameras_from_elsewhere(tasks: &[Task]) -> Result<Vec<Option<Arc<[Camera]>>>, String> {
-    let mut known: HashMap<*const FileSettings, Option<Arc<[Camera]>>> = HashMap::new();
+fn cameras_from_elsewhere(
+    tasks: &[Task],
+    hashes: &HashCache,
+) -> Result<Vec<(Option<Arc<[Camera]>>, CameraOrigin)>, String> {
+    let mut known: HashMap<*const FileSettings, (Option<Arc<[Camera]>>, CameraOrigin)> = HashMap::new();
     tasks
         .iter()
         .map(|Task { settings, .. }| {
             if let Some(cameras) = known.get(&Arc::as_ptr(settings)) {
                 return Ok(cameras.clone());
             }
-            let cameras: Option<Arc<[Camera]>> = settings.camera_source.cameras()?.map(Into::into);
+            let (cameras, origin) = CameraOrigin::read(&settings.camera_source, hashes)?;
+            let cameras: Option<Arc<[Camera]>> = cameras.map(Into::into);
             if let Some(cameras) = &cameras {
                 // What is not there is there for no input.
                 let source = settings.camera_source.options();
                 settings.cameras.select(&names_of(cameras)).map_err(|error| format!("{source}: {error}"))?;
             }
-            known.insert(Arc::as_ptr(settings), cameras.clone());
-            Ok(cameras)
+            known.insert(Arc::as_ptr(settings), (cameras.clone(), origin.clone()));
+            Ok((cameras, origin))
         })
         .collect()
 }

@@ -1,9 +1,12 @@
 //! Writes the pictures that were rendered, EXR first, the report last: it says what the others hold.
 
+use super::develop::develop;
+use super::fingerprint::Fingerprint;
+use super::load_stage::Sources;
 use super::output::{WriteError, write_atomic};
-use super::picture::{exr_bytes, png_bytes};
+use super::picture::exr_bytes;
 use super::render_stage::fail;
-use super::report::{self, ImageReport, Status};
+use super::report::{self, ExposureReport, ImageReport, Status};
 use super::run::{Event, ImageId, Shared};
 use crate::render::{Frame, Phase, Progress, RenderSettings};
 use std::path::{Path, PathBuf};
@@ -20,10 +23,20 @@ pub(super) struct Made {
     pub image: Box<ImageReport>,
     /// Output path without extension, below the output folder; `None` = it may write nothing, not even its report.
     pub output: Option<PathBuf>,
-    /// The picture and the settings it was rendered with; `None` = there is none, and `image` says why.
-    pub frame: Option<Box<(Frame, RenderSettings)>>,
+    /// `None` = there is none, and `image` says why.
+    pub picture: Option<Box<Picture>>,
     /// The file could not be read.
     pub is_bad_input: bool,
+}
+
+/// A picture to write.
+pub(super) struct Picture {
+    pub frame: Frame,
+    /// With which it was rendered.
+    pub settings: RenderSettings,
+    /// Its place among the scene's.
+    pub camera: usize,
+    pub sources: Arc<Sources>,
 }
 
 /// The thread that writes.
@@ -54,18 +67,20 @@ impl WriteStage {
 
     /// All files of one image.
     fn write(&self, made: Made) -> (Box<ImageReport>, Result<(), WriteError>) {
-        let Made { task, progress, mut image, output, frame, .. } = made;
+        let Made { task, progress, mut image, output, picture, .. } = made;
         progress.enter(Phase::Writing);
         let clock = Instant::now();
         let mut written = Ok(());
-        if let (Some(output), Some(frame)) = (&output, frame) {
-            written = self.pictures(task, &frame.0, &frame.1, output, &mut image);
+        if let (Some(output), Some(picture)) = (&output, picture) {
+            written = self.pictures(task, &picture, output, &mut image);
             image.seconds.write = Some(clock.elapsed().as_secs_f64());
             image.seconds.total += clock.elapsed().as_secs_f64();
         }
-        image.peak_rss_bytes = report::peak_rss_bytes();
+        if image.status != Status::UpToDate {
+            image.peak_rss_bytes = report::peak_rss_bytes();
+        }
         if let (Some(output), Ok(())) = (&output, &written) {
-            let path = self.path(output, "json");
+            let path = self.shared.path(output, "json");
             image.outputs.json = Some(path.display().to_string());
             written = write_atomic(&path, report::to_json(&image).as_bytes());
         }
@@ -80,15 +95,29 @@ impl WriteStage {
     fn pictures(
         &self,
         task: usize,
-        frame: &Frame,
-        settings: &RenderSettings,
+        picture: &Picture,
         output: &Path,
         image: &mut ImageReport,
     ) -> Result<(), WriteError> {
+        let Picture { frame, settings, camera, sources } = picture;
         let files = self.shared.settings.tasks[task].settings.files;
+        match sources.records() {
+            Ok(inputs) => {
+                let wanted = self.shared.wanted(task, *camera);
+                image.fingerprint = Some(Fingerprint::new(&wanted, inputs.clone()));
+            }
+            Err(changed) => {
+                image.warnings.push(format!("{changed}; this picture will not be taken for up to date"));
+            }
+        }
         if files.exr {
-            match self.shared.beside.install(|| exr_bytes(frame, settings, files.compression)) {
-                Ok(bytes) => image.outputs.exr = Some(self.file(output, "exr", &bytes)?),
+            let fingerprint = image.fingerprint.as_ref().map(|f| f.pixels.as_str());
+            match self.shared.beside.install(|| exr_bytes(frame, settings, files.format, fingerprint)) {
+                Ok((bytes, clipped)) => {
+                    image.clipped_pixels = clipped;
+                    image.warnings.extend(clipped.filter(|clipped| *clipped > 0).map(clipped_warning));
+                    image.outputs.exr = Some(self.file(output, "exr", &bytes, &mut image.fingerprint)?);
+                }
                 Err(error) => {
                     fail(image, format!("{}: {error}", image.input));
                     return Ok(());
@@ -96,26 +125,36 @@ impl WriteStage {
             }
         }
         if files.png {
-            let (bytes, nan_channels) = png_bytes(frame, &files.tone);
-            if nan_channels > 0 {
-                image.warnings.push(format!("{nan_channels} channels of the picture are NaN; the PNG shows them as 0"));
-            }
-            image.outputs.png = Some(self.file(output, "png", &bytes)?);
+            let size = [frame.window.width, frame.window.height];
+            let developed = develop(&frame.pixels, None, size, files.tone);
+            image.exposure = Some(ExposureReport::new(files.tone.exposure, developed.exposure));
+            image.notes.extend(developed.notes);
+            image.warnings.extend(developed.warnings);
+            image.outputs.png = Some(self.file(output, "png", &developed.png, &mut image.fingerprint)?);
         }
         image.status = Status::Rendered;
         Ok(())
     }
 
-    /// Writes `<out>/<output>.<extension>` and tells its path.
-    fn file(&self, output: &Path, extension: &str, bytes: &[u8]) -> Result<String, WriteError> {
-        let path = self.path(output, extension);
-        write_atomic(&path, bytes).map(|()| path.display().to_string())
+    /// Writes `<out>/<output>.<extension>`, notes it and tells its path.
+    fn file(
+        &self,
+        output: &Path,
+        extension: &str,
+        bytes: &[u8],
+        fingerprint: &mut Option<Fingerprint>,
+    ) -> Result<String, WriteError> {
+        let path = self.shared.path(output, extension);
+        write_atomic(&path, bytes)?;
+        if let Some(fingerprint) = fingerprint {
+            fingerprint.add_output(extension, bytes);
+        }
+        Ok(path.display().to_string())
     }
+}
 
-    fn path(&self, output: &Path, extension: &str) -> PathBuf {
-        let mut name = self.shared.settings.out.join(output).into_os_string();
-        name.push(".");
-        name.push(extension);
-        name.into()
-    }
+fn clipped_warning(clipped: u64) -> String {
+    format!(
+        "{clipped} pixels are beyond 65504, the most that --exr half holds, and were clipped; --exr float keeps them"
+    )
 }

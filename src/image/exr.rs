@@ -1,6 +1,7 @@
-//! Writes OpenEXR: linear float R, G, B, A with metadata; equal pictures have equal bytes.
+//! Writes OpenEXR: linear R, G, B, A, float or half, with metadata; equal pictures have equal bytes.
 
 use super::exr_header::sort_attributes;
+use exr::image::write::channels::WritableChannels;
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::*;
 use glam::{DMat4, DVec3, DVec4};
@@ -20,6 +21,25 @@ pub enum ExrCompression {
     Rle,
     /// As it is.
     None,
+}
+
+/// How a sample is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExrSamples {
+    /// 32 bits: as rendered.
+    #[default]
+    Float,
+    /// 16 bits: 11 bits of precision; beyond 65504 clipped, see [`clipped_by_half`].
+    Half,
+}
+
+/// How an EXR is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExrOptions {
+    /// Of every channel.
+    pub samples: ExrSamples,
+    /// Of the pixel data; lossless.
+    pub compression: ExrCompression,
 }
 
 /// What an EXR file says.
@@ -80,15 +100,52 @@ pub enum ExrValue {
 ///
 /// # Errors
 /// The pixels do not fill the data window, or the picture does not fit the format, as text.
-pub fn encode(picture: &ExrPicture<'_>, compression: ExrCompression) -> std::result::Result<Vec<u8>, String> {
+pub fn encode(picture: &ExrPicture<'_>, options: ExrOptions) -> std::result::Result<Vec<u8>, String> {
     let size = picture.size.map(|side| side as usize);
     if picture.pixels.len() != size[0] * size[1] {
         return Err(format!("EXR: {} pixels do not fill {} x {}", picture.pixels.len(), size[0], size[1]));
     }
-    let channels = SpecificChannels::rgba(|at: Vec2<usize>| {
-        let [r, g, b] = picture.pixels[at.y() * size[0] + at.x()];
-        (r, g, b, 1.0_f32)
-    });
+    let pixel = |at: Vec2<usize>| picture.pixels[at.y() * size[0] + at.x()];
+    let mut bytes = Cursor::new(Vec::new());
+    match options.samples {
+        ExrSamples::Float => {
+            let float = |at| {
+                let [r, g, b] = pixel(at);
+                (r, g, b, 1.0_f32)
+            };
+            image(picture, options.compression, SpecificChannels::rgba(float)).write().to_buffered(&mut bytes)
+        }
+        ExrSamples::Half => {
+            let half = |at| {
+                let [r, g, b] = pixel(at).map(half);
+                (r, g, b, f16::ONE)
+            };
+            image(picture, options.compression, SpecificChannels::rgba(half)).write().to_buffered(&mut bytes)
+        }
+    }
+    .map_err(|error| format!("EXR: {error}"))?;
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes).ok_or("EXR: the header just written cannot be read")?;
+    Ok(bytes)
+}
+
+/// The nearest half; beyond the greatest, that one instead of infinity. NaN stays NaN.
+fn half(value: f32) -> f16 {
+    f16::from_f32(value.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
+}
+
+/// How many of `pixels` have a channel that half clips: beyond 65504 either way, infinity included.
+pub fn clipped_by_half(pixels: &[[f32; 3]]) -> u64 {
+    let is_clipped = |pixel: &&[f32; 3]| pixel.iter().any(|c| c.abs() > f16::MAX.to_f32());
+    pixels.iter().filter(is_clipped).count() as u64
+}
+
+/// An EXR of `channels` with what else `picture` says.
+fn image<'c, C: WritableChannels<'c> + 'c>(
+    picture: &ExrPicture<'_>,
+    compression: ExrCompression,
+    channels: C,
+) -> Image<Layer<C>> {
     let encoding = Encoding {
         compression: match compression {
             ExrCompression::Zip => Compression::ZIP16,
@@ -101,6 +158,7 @@ pub fn encode(picture: &ExrPicture<'_>, compression: ExrCompression) -> std::res
         // Any other order would let the threads that compress decide the order of the chunks.
         line_order: LineOrder::Increasing,
     };
+    let size = picture.size.map(|side| side as usize);
     let mut layer = Layer::new((size[0], size[1]), LayerAttributes::default(), encoding, channels);
     layer.attributes.layer_position = Vec2(picture.origin[0] as i32, picture.origin[1] as i32);
     let matrices = CameraMatrices::new(&picture.camera);
@@ -119,11 +177,7 @@ pub fn encode(picture: &ExrPicture<'_>, compression: ExrCompression) -> std::res
         IntegerBounds::new(Vec2(0, 0), Vec2(picture.display_size[0] as usize, picture.display_size[1] as usize));
     image.attributes.chromaticities = Some(REC_709);
 
-    let mut bytes = Cursor::new(Vec::new());
-    image.write().to_buffered(&mut bytes).map_err(|error| format!("EXR: {error}"))?;
-    let mut bytes = bytes.into_inner();
-    sort_attributes(&mut bytes).ok_or("EXR: the header just written cannot be read")?;
-    Ok(bytes)
+    image
 }
 
 /// Primaries and white point of ITU-R BT.709.

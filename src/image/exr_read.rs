@@ -1,4 +1,4 @@
-//! Reads the colour of EXR files of any renderer, for comparison.
+//! Reads the colour of EXR files of any renderer, for comparison and for other tone curves.
 
 use exr::prelude::*;
 use std::io::Cursor;
@@ -49,6 +49,15 @@ pub fn read(path: &Path) -> std::result::Result<Picture, String> {
 /// # Errors
 /// It is no EXR, it is damaged, or it has no colour channels.
 pub fn decode(bytes: &[u8]) -> std::result::Result<Picture, String> {
+    decode_with_alpha(bytes).map(|(picture, _)| picture)
+}
+
+/// [`decode`], and the samples of `A` of the same layer if it has one: `[height * width]`, 1 = opaque, the colour being
+/// premultiplied by it.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_with_alpha(bytes: &[u8]) -> std::result::Result<(Picture, Option<Vec<f32>>), String> {
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -57,7 +66,7 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<Picture, String> {
         .all_attributes()
         .from_buffered(Cursor::new(bytes))
         .map_err(|error| format!("not a readable EXR: {error}"))?;
-    let rgb = |layer: &Layer<AnyChannels<FlatSamples>>, prefix: &str| -> Option<Picture> {
+    let rgb = |layer: &Layer<AnyChannels<FlatSamples>>, prefix: &str| -> Option<(Picture, Option<Vec<f32>>)> {
         let find = |name: &str| {
             let full = format!("{prefix}{name}");
             layer.channel_data.list.iter().find(|c| c.name.bytes() == full.as_bytes()).map(|c| &c.sample_data)
@@ -73,7 +82,9 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<Picture, String> {
         }
         let pixels = (0..count).map(|i| channels.map(|c| c.value_by_flat_index(i).to_f32())).collect();
         let Vec2(x, y) = layer.attributes.layer_position;
-        Some(Picture { origin: [x, y], width: layer.size.width(), height: layer.size.height(), pixels })
+        let alpha = find("A").filter(|a| a.len() == count);
+        let alpha = alpha.map(|a| (0..count).map(|i| a.value_by_flat_index(i).to_f32()).collect());
+        Some((Picture { origin: [x, y], width: layer.size.width(), height: layer.size.height(), pixels }, alpha))
     };
     let named = |layer: &Layer<AnyChannels<FlatSamples>>| {
         layer.channel_data.list.iter().find_map(|c| {
@@ -115,6 +126,29 @@ mod tests {
             assert_eq!((picture.width, picture.height), (3, 2));
             assert_eq!(picture.pixels[4], [0.5, 4.0, 3.0]);
         }
+    }
+
+    #[test]
+    fn alpha_is_that_of_the_layer_whose_colour_is_read() {
+        let four = |prefix: &str| {
+            let names = ["R", "G", "B", "A"].map(|name| format!("{prefix}{name}"));
+            (0..)
+                .zip(names)
+                .map(|(i, name)| AnyChannel::new(name.as_str(), FlatSamples::F32(vec![i as f32; 2])))
+                .collect::<Vec<_>>()
+        };
+        let layer = |channels: Vec<_>| {
+            let channels = AnyChannels::sort(channels.into_iter().collect());
+            let layer = Layer::new((2, 1), LayerAttributes::default(), Encoding::SMALL_FAST_LOSSLESS, channels);
+            let mut bytes = Cursor::new(Vec::new());
+            Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+            decode_with_alpha(&bytes.into_inner()).unwrap()
+        };
+        for prefix in ["", "Combined."] {
+            let (picture, alpha) = layer(four(prefix));
+            assert_eq!((picture.pixels[1], alpha.unwrap()), ([0.0, 1.0, 2.0], vec![3.0; 2]));
+        }
+        assert!(decode_with_alpha(&written(["R", "G", "B"])).unwrap().1.is_none());
     }
 
     #[test]

@@ -27,7 +27,7 @@ fn picture(width: u32, height: u32, pixels: &[[f32; 3]]) -> ExrPicture<'_> {
 }
 
 fn zip(picture: &ExrPicture<'_>) -> Vec<u8> {
-    encode(picture, ExrCompression::Zip).unwrap()
+    encode(picture, ExrOptions::default()).unwrap()
 }
 
 fn header_of(bytes: &[u8]) -> exr::meta::header::Header {
@@ -55,12 +55,52 @@ fn pixels_read_back_bit_for_bit_in_every_compression() {
     for compression in
         [ExrCompression::Zip, ExrCompression::Zips, ExrCompression::Piz, ExrCompression::Rle, ExrCompression::None]
     {
-        let bytes = encode(&picture(37, 21, &pixels), compression).unwrap();
+        let options = ExrOptions { compression, ..ExrOptions::default() };
+        let bytes = encode(&picture(37, 21, &pixels), options).unwrap();
         let read = exr_read::decode(&bytes).unwrap();
         assert_eq!((read.width, read.height), (37, 21));
         for (a, b) in read.pixels.iter().zip(&pixels) {
             assert_eq!(a.map(f32::to_bits), b.map(f32::to_bits), "{compression:?}");
         }
+    }
+}
+
+const HALF: ExrOptions = ExrOptions { samples: ExrSamples::Half, compression: ExrCompression::Zip };
+
+#[test]
+fn half_clips_at_its_greatest_and_the_clipped_pixels_are_counted() {
+    // 65519.99 would round to 65504 and 65520 to infinity; whatever lies beyond 65504 is clipped.
+    let values = [65504.0, 65504.004, 65519.99, 65520.0, 1e6, 1e38, -1e6, f32::INFINITY, f32::NAN, 6e-8, 1e-9, 0.1];
+    let read = |value: f32| {
+        let bytes = encode(&picture(1, 1, &[[value, 0.5, -0.0]]), HALF).unwrap();
+        let header = header_of(&bytes);
+        assert!(header.channels.list.iter().all(|channel| channel.sample_type == SampleType::F16));
+        exr_read::decode(&bytes).unwrap().pixels[0]
+    };
+    for value in values {
+        let clipped = clipped_by_half(&[[0.5, value, 0.25]]);
+        assert_eq!(clipped, u64::from(value.abs() > 65504.0), "{value}");
+        let [found, half, zero] = read(value);
+        assert_eq!((half, zero.to_bits()), (0.5, (-0.0_f32).to_bits()));
+        match value {
+            _ if clipped > 0 => assert_eq!(found, 65504.0_f32.copysign(value), "{value}"),
+            _ if value.is_nan() => assert!(found.is_nan()),
+            // Half a step of 11 bits, or of the smallest half, 2^-24.
+            _ => assert!((found - value).abs() <= (value * 0.5_f32.powi(11)).max(0.5_f32.powi(25)), "{value} {found}"),
+        }
+    }
+    let many = [[1e5, 1e5, 1e5], [1.0, 2.0, 3.0], [0.0, f32::NEG_INFINITY, 0.0]];
+    assert_eq!(clipped_by_half(&many), 2);
+}
+
+#[test]
+fn every_half_survives() {
+    let values: Vec<f32> = (0..=u16::MAX).map(|bits| f16::from_bits(bits).to_f32()).collect();
+    let pixels: Vec<_> = values.iter().map(|&value| [value, -value, 1.0]).collect();
+    let read = exr_read::decode(&encode(&picture(256, 256, &pixels), HALF).unwrap()).unwrap();
+    for (found, value) in read.pixels.iter().zip(values) {
+        let expected = if value.is_infinite() { 65504.0_f32.copysign(value) } else { value };
+        assert!(found[0].to_bits() == expected.to_bits() || found[0].is_nan() && value.is_nan(), "{value}: {found:?}");
     }
 }
 
@@ -84,7 +124,7 @@ fn a_one_pixel_picture_is_written() {
 
 #[test]
 fn pixels_that_do_not_fill_the_window_are_refused() {
-    assert!(encode(&picture(4, 3, &pixels(4, 2)), ExrCompression::Zip).unwrap_err().contains("4 x 3"));
+    assert!(encode(&picture(4, 3, &pixels(4, 2)), ExrOptions::default()).unwrap_err().contains("4 x 3"));
 }
 
 #[test]

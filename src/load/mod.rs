@@ -5,6 +5,8 @@ pub mod gltf;
 pub mod obj;
 mod tangents;
 
+pub use folders::Folders;
+
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};
 use crate::scene::Scene;

@@ -1,6 +1,6 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
-use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, TextureId};
+use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, SourceFile, TextureId};
 use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;
@@ -80,6 +80,11 @@ impl SceneBuilder {
     /// Adds a camera.
     pub fn add_camera(&mut self, camera: Camera) {
         self.scene.cameras.push(camera);
+    }
+
+    /// Says which files the scene was made from.
+    pub fn set_sources(&mut self, sources: Vec<SourceFile>) {
+        self.scene.sources = sources;
     }
 
     /// Notes something the user should know.

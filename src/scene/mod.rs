@@ -3,10 +3,12 @@
 
 mod builder;
 mod check;
+mod source;
 
 pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
 pub use builder::SceneBuilder;
 pub(crate) use check::MAX_COORDINATE;
+pub use source::{SourceFile, Stamp};
 
 use crate::camera::Camera;
 use crate::light::{Environment, Light};
@@ -67,6 +69,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Which scene of the file this is.
     pub index: usize,
+    /// The files it was made from, each name once, in the order in which they were looked for: the input first.
+    pub sources: Vec<SourceFile>,
     /// Said to the user and written into the JSON.
     pub warnings: Vec<String>,
     /// Those of `warnings` that mean that something of the file is not in the picture.

@@ -5,7 +5,9 @@ mod commands;
 mod config;
 mod generate;
 mod meaning;
+mod panics;
 mod parse;
+mod signals;
 mod term;
 mod unbuilt;
 mod words;
@@ -16,6 +18,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    panics::guarded(run)
+}
+
+fn run() -> ExitCode {
     let matches = match unbuilt::add_to(args::Cli::command()).try_get_matches() {
         Ok(matches) => matches,
         Err(error) => match hyphen_file().filter(|_| error.kind() == ErrorKind::UnknownArgument) {
@@ -40,6 +46,7 @@ fn main() -> ExitCode {
     }
     match (cli.command, matches.subcommand()) {
         (Some(args::Command::Compare(options)), _) => commands::compare::run(&options),
+        (Some(args::Command::Retone(options)), _) => commands::retone::run(&options),
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),
     }

@@ -4,8 +4,8 @@ use crate::args::{FileArgs, RunArgs};
 use crate::config::{Config, Definition, Layer};
 use clap::ArgMatches;
 use prt::batch::input::expand;
-use prt::batch::{CameraSource, FileOptions, FileSettings, PictureSize, Task, View};
-use prt::color::ToneMap;
+use prt::batch::{CameraSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
+use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
 use std::collections::HashMap;
@@ -141,8 +141,8 @@ pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
         files: FileOptions {
             exr: !args.no_exr,
             png: !args.no_png,
-            compression: args.exr_compression,
-            tone: ToneMap { exposure: args.exposure, curve: args.tonemap },
+            format: ExrOptions { samples: args.exr, compression: args.exr_compression },
+            tone: Tone { exposure: args.exposure, curve: args.tonemap },
         },
     })
 }

@@ -4,8 +4,8 @@ use crate::generate::Product;
 use crate::words::Words;
 use clap::builder::{PossibleValue, TypedValueParser};
 use prt::batch::{job::CameraChoice, names::NameTemplate};
-use prt::color::ToneCurve;
-use prt::image::exr::ExrCompression;
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::ffi::OsStr;
@@ -139,20 +139,21 @@ pub fn integrator() -> Words<&'static str> {
     Words::new(&[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
 }
 
-pub fn exposure(value: &str) -> Result<f64, String> {
+pub fn exposure(value: &str) -> Result<Exposure, String> {
     if value == "auto" {
-        return Err("auto is not built yet; built: a number of stops".into());
+        return Ok(Exposure::Auto);
     }
     let inside = |stops: &f64| (-100.0..=100.0).contains(stops);
-    value.parse().ok().filter(inside).ok_or_else(|| "must be a number of stops from -100 to 100".into())
+    let stops = value.parse().ok().filter(inside).map(Exposure::Stops);
+    stops.ok_or_else(|| "must be auto or a number of stops from -100 to 100".into())
 }
 
 pub fn tonemap() -> Words<ToneCurve> {
-    Words::new(&[("neutral", ToneCurve::Neutral), ("srgb", ToneCurve::Srgb)], &["agx", "aces"])
+    Words::new(&ToneCurve::NAMES, &[])
 }
 
-pub fn exr() -> Words<&'static str> {
-    Words::new(&[("float", "float")], &["half"])
+pub fn exr() -> Words<ExrSamples> {
+    Words::new(&[("float", ExrSamples::Float), ("half", ExrSamples::Half)], &[])
 }
 
 pub fn exr_compression() -> Words<ExrCompression> {
@@ -165,12 +166,13 @@ pub fn exr_compression() -> Words<ExrCompression> {
 pub enum ProgressStyle {
     Auto,
     Plain,
+    Json,
     None,
 }
 
 pub fn progress() -> Words<ProgressStyle> {
-    use ProgressStyle::{Auto, None, Plain};
-    Words::new(&[("auto", Auto), ("plain", Plain), ("none", None)], &["json"])
+    use ProgressStyle::{Auto, Json, None, Plain};
+    Words::new(&[("auto", Auto), ("plain", Plain), ("json", Json), ("none", None)], &[])
 }
 
 pub fn name(value: &str) -> Result<NameTemplate, String> {

@@ -80,11 +80,14 @@ const OPTIONS: &[Unbuilt] = &[
 ];
 
 /// Commands.
-const COMMANDS: &[&str] = &["bench", "verify", "retone", "doctor"];
+const COMMANDS: &[&str] = &["bench", "verify", "doctor"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {
-    let command = with_options(command).mut_subcommand("render", with_options).mut_subcommand("compare", negatives);
+    let command = with_options(command)
+        .mut_subcommand("render", with_options)
+        .mut_subcommand("compare", negatives)
+        .mut_subcommand("retone", negatives);
     command.subcommands(COMMANDS.iter().map(|name| {
         let anything = Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true);
         Command::new(*name).hide(true).disable_help_flag(true).arg(anything)

@@ -5,6 +5,7 @@ use super::container::{self, Container};
 use super::uri::Resolver;
 use super::{LoadError, Result};
 use crate::error::SourceLoc;
+use crate::scene::SourceFile;
 use gltf::json::Root;
 use serde_json::Value;
 use serde_json::error::Category;
@@ -21,6 +22,8 @@ pub(super) struct Document {
     pub root: Root,
     /// Where URIs may lead.
     pub uris: Resolver,
+    /// The input itself, as it was before it was read.
+    pub source: SourceFile,
     /// Buffers opened so far, one cell per `/buffers/i`.
     pub buffers: Vec<OnceLock<Store>>,
     /// Number of animations, none of which is read.
@@ -36,17 +39,25 @@ pub(super) struct Document {
 impl Document {
     /// Reads and parses the JSON of `file`.
     pub fn open(file: &Path, asset_root: Option<&Path>) -> Result<Self> {
+        let source = SourceFile::input(file);
         let Container { json, bin, warnings } = container::read(file)?;
         let (root, animations) = parse(file, &json)?;
         let uris = Resolver::new(file, asset_root)?;
         let buffers = root.buffers.iter().map(|_| OnceLock::new()).collect();
         let ignored = Mutex::default();
-        Ok(Self { file: file.to_owned(), root, uris, buffers, animations, warnings, ignored, json, bin })
+        Ok(Self { file: file.to_owned(), root, uris, source, buffers, animations, warnings, ignored, json, bin })
     }
 
     /// Where in the file the BIN chunk of a `.glb` is.
     pub fn bin(&self) -> Option<Range<u64>> {
         self.bin.clone()
+    }
+
+    /// The files that were looked for so far, the input first.
+    pub fn sources(&self) -> Vec<SourceFile> {
+        let mut sources = vec![self.source.clone()];
+        sources.extend(self.uris.sources());
+        sources
     }
 
     /// The JSON text.

@@ -67,6 +67,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
     let decode = before.elapsed().as_secs_f64();
 
     loader.note_skipped();
+    loader.builder.set_sources(doc.sources());
     let scene = loader.builder.finish();
     let total = start.elapsed().as_secs_f64();
     Ok((scene, LoadTimes { load: total - decode, decode }))

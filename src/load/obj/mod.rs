@@ -22,7 +22,7 @@ use super::folders::{Folders, read_file};
 use super::tangents::{self, TooManyTriangles};
 use super::{LoadOptions, LoadTimes};
 use crate::error::{LoadError, SourceLoc};
-use crate::scene::{Instance, MaterialId, Scene, SceneBuilder};
+use crate::scene::{Instance, MaterialId, Scene, SceneBuilder, SourceFile};
 use geometry::{Geometry, Part};
 use glam::DMat4;
 use mtl::Written;
@@ -57,6 +57,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), Lo
         return Err(LoadError::new(SourceLoc::file(path), problem, "An OBJ has one scene: leave --scene out."));
     }
     let whole = |problem: String| LoadError::new(SourceLoc::file(path), problem, "");
+    let mut sources = vec![SourceFile::input(path)];
     let bytes = read_file(path).map_err(|why| whole(format!("cannot be read: {why}")))?;
     let folders = Folders::new(path, options.asset_root.as_deref())?;
     let text = Text::new(path, bytes);
@@ -69,6 +70,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), Lo
     let mut decode = 0.0;
     let materials = loader.materials(&geometry, options, &mut decode);
     loader.meshes(geometry, &materials, options);
+    sources.extend(loader.folders.sources());
+    loader.builder.set_sources(sources);
     let scene = loader.builder.finish();
     let total = start.elapsed().as_secs_f64();
     Ok((scene, LoadTimes { load: total - decode, decode }))

@@ -6,8 +6,8 @@
 use crate::parse;
 use clap::{Args, ValueHint};
 use prt::batch::{job::CameraChoice, names::NameTemplate};
-use prt::color::ToneCurve;
-use prt::image::exr::ExrCompression;
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
 use std::path::PathBuf;
@@ -36,12 +36,12 @@ pub struct FileArgs {
     /// picture.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, allow_hyphen_values = true, help_heading = PICTURES)]
     pub crop: Option<CropWindow>,
-    /// Exposure of the PNG in stops
+    /// Exposure of the PNG in stops, or auto
     ///
-    /// From -100 to 100; the EXR is never touched by it. auto is not built.
+    /// From -100 to 100; the EXR is never touched by it. auto and the curves: see "The PNG" below.
     #[arg(long, value_name = "EV", default_value = "0", value_parser = parse::exposure, allow_hyphen_values = true)]
     #[arg(help_heading = PICTURES)]
-    pub exposure: f64,
+    pub exposure: Exposure,
     /// Tone curve of the PNG
     ///
     /// The EXR is never touched by it.
@@ -141,7 +141,7 @@ pub struct FileArgs {
     ///
     /// half clips at 65504 and the clipped pixels are counted.
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = parse::exr(), help_heading = FILES)]
-    pub exr: &'static str,
+    pub exr: ExrSamples,
     /// Compression of the EXR; all are lossless
     #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression(), help_heading = FILES)]
     pub exr_compression: ExrCompression,

@@ -6,10 +6,12 @@
 
 mod compare;
 mod file;
+mod retone;
 mod run;
 
 pub use compare::CompareArgs;
 pub use file::FileArgs;
+pub use retone::RetoneArgs;
 pub use run::RunArgs;
 
 use crate::generate::Product;
@@ -28,6 +30,7 @@ Examples:
   prt-batch --config night.toml                a batch from a file: inputs, options, options of single files
   prt-batch scenes/*.gltf --json > result.json
   prt-batch compare renders/a.exr reference/a.exr --max-relmse 1e-3
+  prt-batch retone renders/ --tonemap agx --exposure auto
   prt-batch --generate complete-bash > ~/.local/share/bash-completion/completions/prt-batch
 
 Exit codes: 0 all rendered or empty; 1 some images failed; 2 usage; 3 every input was bad;
@@ -41,11 +44,20 @@ Examples:
 
 Exit codes: 0 within limits; 1 not; 2 usage; 3 unreadable or of different size.";
 
+const EXAMPLES_OF_RETONE: &str = "\
+Examples:
+  prt-batch retone renders/ --tonemap agx --exposure auto
+  prt-batch retone renders/a.exr --exposure 1.5 --out brighter/
+
+Exit codes: 0 all done; 1 some failed; 2 usage; 3 none could be read; 4 a PNG could not be written.";
+
 /// Path-traces glTF scenes on the CPU, in batches, to linear HDR EXR and tone-mapped PNG.
 #[derive(Debug, Parser)]
 #[command(version, about, after_long_help = EXAMPLES, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(after_help = "--help says more about each option, with examples and exit codes.")]
-#[command(override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF")]
+#[command(
+    override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF\n       prt-batch retone [OPTIONS] IN..."
+)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -64,6 +76,9 @@ pub enum Command {
     /// Error metrics of pictures against a reference, of files or of folders.
     #[command(after_long_help = EXAMPLES_OF_COMPARE)]
     Compare(CompareArgs),
+    /// Tone-map stored EXRs again, no rendering.
+    #[command(after_long_help = EXAMPLES_OF_RETONE)]
+    Retone(RetoneArgs),
 }
 
 #[derive(Args, Debug)]

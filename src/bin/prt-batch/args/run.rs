@@ -27,7 +27,7 @@ pub struct RunArgs {
     pub threads: Option<usize>,
     /// Render even what is up to date
     ///
-    /// Nothing is kept yet, everything renders.
+    /// Up-to-date outputs are kept and reported so; what is up to date is said in docs/cli.md.
     #[arg(long, help_heading = RUN)]
     pub force: bool,
     /// Count as failures what is lost: content, non-finite samples, empty scenes
@@ -42,7 +42,7 @@ pub struct RunArgs {
     pub no_report: bool,
     /// How far the run is, on stderr
     ///
-    /// auto shows a bar on a terminal, else plain lines; plain at most one line a second.
+    /// auto shows bars on a terminal, else plain lines; plain at most one line a second; json a line of JSON now and then.
     #[arg(long, value_name = "STYLE", default_value = "auto", value_parser = parse::progress(), help_heading = TERMINAL)]
     pub progress: ProgressStyle,
     /// Print the run's batch.json on stdout

@@ -1,5 +1,6 @@
 //! `prt-batch compare A... REF`: exit code 0 within limits, 1 not, 2 usage, 3 unreadable.
 
+use super::exr_files::exr_files;
 use crate::args::CompareArgs;
 use crate::term;
 use prt::compare::metrics::{Metrics, mean_picture, metrics};
@@ -95,28 +96,13 @@ fn pair_up(paths: &[PathBuf]) -> Result<Vec<Files>, (u8, String)> {
     if folders < paths.len() {
         return Err((2, "compare takes either files or folders, not both".into()));
     }
-    let mut names = Vec::new();
-    exr_files(reference, Path::new(""), &mut names)
-        .map_err(|error| (3, format!("{}: {error}", reference.display())))?;
+    let names = exr_files(reference, Path::new(""));
+    let names = names.map_err(|error| (3, format!("{}: {error}", reference.display())))?;
     if names.is_empty() {
         return Err((3, format!("{}: there is no .exr file in this folder", reference.display())));
     }
     let pair = |name: PathBuf| (pictures.iter().map(|folder| folder.join(&name)).collect(), reference.join(&name));
     Ok(names.into_iter().map(pair).collect())
-}
-
-fn exr_files(root: &Path, below: &Path, names: &mut Vec<PathBuf>) -> std::io::Result<()> {
-    let mut entries = std::fs::read_dir(root.join(below))?.collect::<Result<Vec<_>, _>>()?;
-    entries.sort_by_key(std::fs::DirEntry::file_name);
-    for entry in entries {
-        let name = below.join(entry.file_name());
-        if entry.file_type()?.is_dir() {
-            exr_files(root, &name, names)?;
-        } else if name.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
-            names.push(name);
-        }
-    }
-    Ok(())
 }
 
 fn compare(paths: &[PathBuf], reference_path: &Path, rel_se: f64, args: &CompareArgs) -> Result<Pair, String> {

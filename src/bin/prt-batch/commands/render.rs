@@ -1,6 +1,7 @@
 //! `prt-batch INPUT...`
 
 use crate::meaning::Meaning;
+use crate::signals;
 use crate::term::{self, Reporter, Verbosity};
 use clap::ArgMatches;
 use prt::batch::{self, BatchSettings, Stop};
@@ -30,9 +31,12 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         _ => Verbosity::Normal,
     };
     let mut reporter = Reporter::new(args.progress, verbosity);
+    if let Err(error) = signals::install(&settings.cancel) {
+        term::warning(&format!("signals will end the process at once: {error}"));
+    }
     match batch::run(settings, &mut reporter) {
         Ok(outcome) => {
-            reporter.summary(&outcome);
+            reporter.summary(&outcome, &args.out);
             if args.json {
                 term::print(&batch::report::to_json(&outcome.report));
             }

@@ -1,0 +1,267 @@
+//! What an image was made from, as two hashes and the list behind them: equal fingerprints mean equal files.
+//!
+//! A fingerprint is known before the scene is loaded, or it would be of no use for not loading it. So it holds what was
+//! asked for (`auto`, a width without a height), and the bytes of files instead of what a loader makes of them. It holds
+//! no path, and nothing of this machine: equal inputs in another folder have the same fingerprint.
+
+use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
+use super::develop::Tone;
+use super::picture::FileOptions;
+use super::settings::FileSettings;
+use super::size::PictureSize;
+use super::view::{CameraSource, View};
+use crate::camera::Camera;
+use crate::color::Exposure;
+use crate::image::exr::ExrOptions;
+use crate::load::LoadOptions;
+use crate::render::{CropWindow, Filter, RenderSettings};
+use crate::scene::SourceFile;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt::{Debug, Write};
+use std::path::Path;
+
+/// Settings by the name of their option, sorted, so that equal settings are equal text.
+pub type Settings = BTreeMap<String, String>;
+
+/// What an image was made from, as its JSON has it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fingerprint {
+    /// Version of the program.
+    pub prt: String,
+    /// Hash of everything that determines the pixels, 64 hexadecimal digits; the EXR has it as `prt:fingerprint`.
+    pub pixels: String,
+    /// Hash of everything that determines the bytes of the files.
+    pub files: String,
+    /// What was asked for, as far as it matters.
+    pub settings: Settings,
+    /// The files that were read or looked for, the input first.
+    pub inputs: Vec<InputRecord>,
+    /// The files that were written.
+    pub outputs: Vec<OutputRecord>,
+}
+
+/// A file that was written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct OutputRecord {
+    /// Its extension: `exr` or `png`.
+    pub kind: String,
+    /// Length.
+    pub bytes: u64,
+    /// See [`Content::blake3`].
+    pub blake3: String,
+}
+
+/// An image as it is asked for, before its input is read.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// The scene file.
+    pub input: &'a Path,
+    /// How it is made.
+    pub settings: &'a FileSettings,
+    /// Whose cameras, as `settings.camera_source` has it.
+    pub origin: &'a CameraOrigin,
+    /// Which of them, by its place.
+    pub camera: usize,
+}
+
+/// Where cameras come from, as far as pixels depend on it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CameraOrigin {
+    /// The input, whose bytes are in the fingerprint anyway.
+    Input,
+    /// A file with this in it.
+    File(Content),
+    /// Numbers.
+    View(View),
+}
+
+impl CameraOrigin {
+    /// The cameras of `source` (see [`CameraSource`]; `None`: each input has its own) and where they come from.
+    ///
+    /// # Errors
+    /// There are none, or their file changed while it was read; the text names the option.
+    pub fn read(source: &CameraSource, cache: &HashCache) -> Result<(Option<Vec<Camera>>, Self), String> {
+        let file = match source {
+            CameraSource::File(path) => Some(SourceFile::input(path)),
+            CameraSource::Inputs | CameraSource::View(_) => None,
+        };
+        let cameras = source.cameras()?;
+        let origin = match source {
+            CameraSource::Inputs => Self::Input,
+            CameraSource::View(view) => Self::View(*view),
+            CameraSource::File(path) => {
+                let changed =
+                    |changed: Changed| format!("--camera-from {changed}\n  Run it again when it is complete.");
+                let records = hash_sources(file.as_slice(), cache).map_err(changed)?;
+                let content = records.first().and_then(InputRecord::content);
+                // It was read, so it was there; a stamp is missing only where it came into being just then.
+                Self::File(content.ok_or_else(|| changed(Changed { path: path.clone(), error: None }))?)
+            }
+        };
+        Ok((cameras, origin))
+    }
+}
+
+impl Fingerprint {
+    /// Of the image `wanted`, made from `inputs`; outputs are added as they are written.
+    pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>) -> Self {
+        let (pixel_settings, file_settings) = (wanted.pixel_settings(), file_settings(&wanted.settings.files));
+        let pixels = hash_pixels(&pixel_settings, &inputs);
+        Self {
+            prt: crate::VERSION.into(),
+            files: hash_files(&pixels, &file_settings),
+            pixels,
+            settings: pixel_settings.into_iter().chain(file_settings).collect(),
+            inputs,
+            outputs: Vec::new(),
+        }
+    }
+
+    /// Notes that a file with this extension and these bytes was written.
+    pub fn add_output(&mut self, kind: &str, bytes: &[u8]) {
+        let Content { bytes, blake3 } = Content::of(bytes);
+        self.outputs.push(OutputRecord { kind: kind.into(), bytes, blake3 });
+    }
+
+    /// Whether a file with this extension was written.
+    pub fn has_output(&self, kind: &str) -> bool {
+        self.outputs.iter().any(|output| output.kind == kind)
+    }
+}
+
+impl Wanted<'_> {
+    /// Everything that determines the pixels but the bytes of the inputs. Structures are taken apart whole, so that a
+    /// field that is added to one of them must be put here, or named as one that changes no pixel.
+    pub fn pixel_settings(&self) -> Settings {
+        let Self { input, settings, origin, camera } = *self;
+        // Names of files change no pixel; which cameras and from where is said by `origin` and `camera`; `files` comes
+        // after the pixels.
+        let FileSettings { name: _, size, camera_source: _, cameras: _, load, render, files: _ } = settings;
+        let mut lines = Settings::new();
+        let mut set = |key: &str, value: String| _ = lines.insert(key.into(), value);
+        set(
+            "size",
+            match size {
+                // Its height follows from the camera, which is in the inputs.
+                PictureSize::Width(width) => format!("{width} wide"),
+                PictureSize::Exact(width, height) => format!("{width}x{height}"),
+            },
+        );
+        set("camera", camera.to_string());
+        match origin {
+            CameraOrigin::Input => {}
+            CameraOrigin::File(Content { bytes, blake3 }) => set("camera-from", format!("{bytes} bytes, {blake3}")),
+            CameraOrigin::View(View { eye, look_at, up, yfov }) => {
+                for (key, [x, y, z]) in [("eye", eye), ("look-at", look_at), ("up", up)].map(|(k, v)| (k, v.to_array()))
+                {
+                    set(key, format!("{x},{y},{z}"));
+                }
+                set("yfov", yfov.to_string());
+            }
+        }
+
+        // The asset root only decides which files may be read; those that were are listed with their contents.
+        let LoadOptions { asset_root: _, scene, obj_up, obj_scale, smooth_angle } = load;
+        set("scene", scene.clone().unwrap_or_else(|| "default".into()));
+        if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+            set("obj-up", name(obj_up));
+            set("obj-scale", obj_scale.unwrap_or(1.0).to_string());
+            set("smooth-angle", smooth_angle.map_or_else(|| "off".into(), |angle| angle.to_string()));
+        }
+
+        let RenderSettings {
+            // Follow from `size`.
+            width: _,
+            height: _,
+            crop,
+            spp,
+            seed,
+            frame,
+            max_bounces,
+            cull_backfaces,
+            filter,
+            brdf,
+            default_light,
+            // As asked for: which backend `auto` takes is known only when the scene is prepared, and their pictures
+            // differ by rounding alone.
+            accel,
+            // Where a library lies, how many work and how many lanes at a time: rounding at most.
+            embree_dirs: _,
+            threads: _,
+            lanes: _,
+        } = render;
+        let whole = || "whole".into();
+        set("crop", crop.map_or_else(whole, |CropWindow { x, y, width, height }| format!("{x},{y},{width},{height}")));
+        set("spp", spp.to_string());
+        set("seed", seed.to_string());
+        set("frame", frame.to_string());
+        set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
+        set("cull-backfaces", if *cull_backfaces { "on" } else { "off" }.into());
+        set(
+            "filter",
+            match filter {
+                Filter::Box { width } => format!("box:{width}"),
+                Filter::Tent { width } => format!("tent:{width}"),
+            },
+        );
+        set("brdf", name(brdf));
+        set("default-light", name(default_light));
+        set("accel", name(accel));
+        lines
+    }
+}
+
+/// How the files that are asked for are made of the pixels.
+pub fn file_settings(files: &FileOptions) -> Settings {
+    let FileOptions { exr, png, format: ExrOptions { samples, compression }, tone: Tone { exposure, curve } } = files;
+    let mut lines = Settings::new();
+    if *exr {
+        lines.insert("exr".into(), name(samples));
+        lines.insert("exr-compression".into(), name(compression));
+    }
+    if *png {
+        let exposure = match exposure {
+            Exposure::Stops(stops) => stops.to_string(),
+            // A function of the pixels.
+            Exposure::Auto => "auto".into(),
+        };
+        lines.insert("exposure".into(), exposure);
+        lines.insert("tonemap".into(), name(curve));
+    }
+    lines
+}
+
+/// The name of a variant without fields: only shown, and compared with names made in the same way.
+fn name(variant: &impl Debug) -> String {
+    format!("{variant:?}").to_ascii_lowercase()
+}
+
+/// See [`Fingerprint::pixels`].
+pub(super) fn hash_pixels(settings: &Settings, inputs: &[InputRecord]) -> String {
+    let mut text = format!("prt pixels 1\nversion {}\n", crate::VERSION);
+    for InputRecord { path: _, name, bytes, blake3 } in inputs {
+        let _ = match (bytes, blake3) {
+            // Names are quoted, so that none can pass for a line.
+            (Some(bytes), Some(blake3)) => writeln!(text, "input {} {bytes} {}", quoted(name), quoted(blake3)),
+            _ => writeln!(text, "input {} absent", quoted(name)),
+        };
+    }
+    hash_text(text, settings)
+}
+
+/// See [`Fingerprint::files`].
+pub(super) fn hash_files(pixels: &str, settings: &Settings) -> String {
+    hash_text(format!("prt files 1\npixels {}\n", quoted(pixels)), settings)
+}
+
+fn hash_text(mut text: String, settings: &Settings) -> String {
+    for (key, value) in settings {
+        let _ = writeln!(text, "{key} = {}", quoted(value));
+    }
+    Content::of(text.as_bytes()).blake3
+}
+
+fn quoted(text: &str) -> serde_json::Value {
+    text.into()
+}

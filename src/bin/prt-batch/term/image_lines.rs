@@ -1,0 +1,115 @@
+//! What is said about one finished image.
+
+use super::style::Paint;
+use super::text::{count, indented, mrays_per_s, printable, seconds};
+use prt::batch::report::{Accel, ImageReport, Status};
+
+/// As users read it.
+pub fn status_word(status: Status) -> &'static str {
+    match status {
+        Status::Rendered => "rendered",
+        Status::UpToDate => "up to date",
+        Status::Empty => "empty",
+        Status::Failed => "failed",
+        Status::Interrupted => "interrupted",
+    }
+}
+
+/// A name that no other image of the run has: its first output, else its input.
+pub fn name(image: &ImageReport) -> String {
+    let outputs = [&image.outputs.exr, &image.outputs.png];
+    printable(outputs.into_iter().flatten().next().unwrap_or(&image.input))
+}
+
+/// `renders/cornell.exr  1280x720  64 spp  3.1 s  82 Mray/s`, or the name and what else came of it.
+pub fn line(image: &ImageReport, paint: Paint) -> String {
+    if image.status != Status::Rendered {
+        return format!("{}: {}", name(image), paint.status(image.status, status_word(image.status)));
+    }
+    // Without pictures the JSON is what came of it.
+    let json = image.outputs.json.as_ref().filter(|_| image.outputs.exr.is_none() && image.outputs.png.is_none());
+    let mut line = json.map_or_else(|| name(image), |json| printable(json));
+    line += &format!("  {}  {} spp  {}", size(image).unwrap_or_default(), image.spp, seconds(image.seconds.total));
+    if let Some(speed) = image.mrays_per_s {
+        line += &format!("  {}", mrays_per_s(speed));
+    }
+    line
+}
+
+/// `1280x720`.
+pub fn size(image: &ImageReport) -> Option<String> {
+    Some(format!("{}x{}", image.width?, image.height?))
+}
+
+/// `rays by embree 4.4.0 avx512`, and why.
+pub fn accel_line(accel: &Accel, note: &str, is_verbose: bool) -> String {
+    let words = [accel.used.as_deref(), accel.version.as_deref(), accel.isa.as_deref()];
+    let words: Vec<_> = words.into_iter().flatten().collect();
+    // The last line of the note is its gist, those before say what was tried.
+    let note = if is_verbose { indented(note) } else { note.lines().last().unwrap_or_default().to_owned() };
+    let note = if note.is_empty() { note } else { format!(" ({note})") };
+    format!("rays by {}{note}", words.join(" "))
+}
+
+/// Where the time went, what was traced, and what was left out.
+pub fn details(image: &ImageReport) -> Vec<String> {
+    let s = &image.seconds;
+    let phases = [("load", s.load), ("decode", s.decode), ("build", s.build), ("render", s.render), ("write", s.write)];
+    let known = phases.into_iter().filter_map(|(name, value)| Some(format!("{name} {}", seconds(value?))));
+    let known: Vec<_> = known.collect();
+    let mut lines = Vec::new();
+    if !known.is_empty() {
+        lines.push(format!("  {}", known.join(", ")));
+    }
+    if let (Some(rays), Some(triangles)) = (&image.rays, image.triangles) {
+        let (camera, bounce, shadow) = (rays.camera, rays.bounce, rays.shadow);
+        let triangles = count(triangles, "triangle");
+        lines.push(format!("  {triangles}; rays: {camera} camera, {bounce} bounce, {shadow} shadow"));
+    }
+    lines.extend(image.skipped.iter().map(|s| format!("  skipped {}: {}", printable(&s.what), printable(&s.why))));
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use prt::batch::report::{Outputs, Rays, Seconds};
+
+    fn rendered() -> ImageReport {
+        ImageReport {
+            input: "scenes/cornell.gltf".into(),
+            status: Status::Rendered,
+            outputs: Outputs { exr: Some("renders/cornell.exr".into()), ..Outputs::default() },
+            width: Some(1280),
+            height: Some(720),
+            spp: 64,
+            seconds: Seconds { load: Some(0.004), render: Some(2.9), total: 3.1, ..Seconds::default() },
+            rays: Some(Rays { camera: 1, bounce: 2, shadow: 3, total: 6 }),
+            mrays_per_s: Some(82.1),
+            triangles: Some(36),
+            ..ImageReport::default()
+        }
+    }
+
+    #[test]
+    fn a_finished_image_is_one_line() {
+        assert_eq!(line(&rendered(), Paint::OFF), "renders/cornell.exr  1280x720  64 spp  3.1 s  82 Mray/s");
+        let empty = ImageReport { status: Status::Empty, outputs: Outputs::default(), ..rendered() };
+        assert_eq!(line(&empty, Paint::OFF), "scenes/cornell.gltf: empty");
+    }
+
+    #[test]
+    fn an_image_without_pictures_is_named_by_its_report() {
+        let outputs = Outputs { json: Some("renders/cornell.json".into()), ..Outputs::default() };
+        let image = ImageReport { outputs, ..rendered() };
+        assert!(line(&image, Paint::OFF).starts_with("renders/cornell.json  1280x720"), "{}", line(&image, Paint::OFF));
+    }
+
+    #[test]
+    fn details_say_where_time_went_and_what_was_traced() {
+        assert_eq!(
+            details(&rendered()),
+            ["  load 4 ms, render 2.9 s", "  36 triangles; rays: 1 camera, 2 bounce, 3 shadow"]
+        );
+    }
+}
