@@ -69,6 +69,9 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--exr-compression", "dwaa", "zip, zips, piz, rle, none"),
         ("--progress", "dots", "auto, plain, json, none"),
         ("--threads", "0", "from 1"),
+        ("--memory", "0", "8GiB"),
+        ("--memory", "8G", "KiB MiB GiB TiB"),
+        ("--memory", "-5%", "from 1% to 100%"),
         ("--name", "{steam}", "{stem}, {parent}, {camera}"),
         ("--name", "{frame}", "not built yet"),
         ("--name", "../{stem}", "below the output folder"),
@@ -100,15 +103,14 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         "--aperture-blades",
         "--sensor",
         "--aov",
-        "--memory",
     ] {
         refused(root.path(), &["a.gltf", option, "-1"], 2, &[&format!("{option} is not built yet")]);
         refused(root.path(), &["render", option, "1", "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
-    for option in ["--transparent", "--texture-lod", "--explain"] {
+    for option in ["--transparent", "--texture-lod"] {
         refused(root.path(), &[option, "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }
-    for command in ["bench", "verify", "doctor"] {
+    for command in ["bench", "verify"] {
         refused(root.path(), &[command, "a.gltf", "--out", "x"], 2, &[&format!("{command} is not built yet")]);
     }
     assert!(!root.path().join("renders").exists());
@@ -146,7 +148,12 @@ fn bad_inputs_exit_with_3_and_name_the_file() {
     fs::create_dir(root.path().join("empty")).unwrap();
     fs::write(root.path().join("scene.txt"), "").unwrap();
     refused(root.path(), &["nosuch.gltf"], 3, &["nosuch.gltf", "no such file"]);
-    refused(root.path(), &["scenes/*.gltf"], 3, &["scenes/*.gltf", "no file matches this pattern", "Is the folder right?"]);
+    refused(
+        root.path(),
+        &["scenes/*.gltf"],
+        3,
+        &["scenes/*.gltf", "no file matches this pattern", "Is the folder right?"],
+    );
     refused(root.path(), &["empty"], 3, &["empty", "no scene file", ".gltf"]);
     refused(root.path(), &["scene.txt"], 3, &["scene.txt", "not a scene file", ".glb"]);
 }

@@ -7,7 +7,8 @@ use std::process::Command;
 const BIN: &str = env!("CARGO_BIN_EXE_prt-batch");
 
 fn printed(args: &[&str]) -> String {
-    let output = Command::new(BIN).args(args).env_remove("COLUMNS").output().expect("the binary was built for this test");
+    let output =
+        Command::new(BIN).args(args).env_remove("COLUMNS").output().expect("the binary was built for this test");
     assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).expect("text")
 }
@@ -16,7 +17,8 @@ fn printed(args: &[&str]) -> String {
 fn options_of(help: &str) -> Vec<String> {
     // `  -s, --spp` or `      --size`; what is further in is text.
     let name = |line: &str| {
-        let option = line.strip_prefix("      ").or_else(|| line.strip_prefix("  -")?.split_once(", ").map(|(_, o)| o))?;
+        let option =
+            line.strip_prefix("      ").or_else(|| line.strip_prefix("  -")?.split_once(", ").map(|(_, o)| o))?;
         let end = option.find([' ', '=']).unwrap_or(option.len());
         option.starts_with("--").then(|| option[..end].to_owned())
     };
@@ -40,7 +42,9 @@ fn the_tables_of_the_documentation_are_those_of_the_program() {
             continue;
         };
         if docs[start..end] != *table {
-            missing.push(format!("docs/cli.md: the table after {before} is not what prt-batch --generate options-md prints"));
+            missing.push(format!(
+                "docs/cli.md: the table after {before} is not what prt-batch --generate options-md prints"
+            ));
             docs.replace_range(start..end, table);
         }
     }

@@ -70,7 +70,10 @@ const CONFIGS: &[(&str, &str)] = &[
     ("config-value-bool", "spp = true\n"),
     ("config-value-too-short", "eye = [1, 2]\n"),
     ("config-contradiction", "width = 640\nspp = 5\nsize = \"640x360\"\n"),
-    ("config-contradiction-in-block", "[[file]]\nmatch = \"*\"\ncamera = 1\ncamera-from = \"b.glb\"\neye = [0, 0, 1]\n"),
+    (
+        "config-contradiction-in-block",
+        "[[file]]\nmatch = \"*\"\ncamera = 1\ncamera-from = \"b.glb\"\neye = [0, 0, 1]\n",
+    ),
     ("config-run-in-block", "spp = 5\n[[file]]\nmatch = \"a.gltf\"\nout = \"x\"\n"),
     ("config-inputs-in-block", "[[file]]\nmatch = \"a.gltf\"\ninputs = \"b.gltf\"\n"),
     ("config-inputs-wrong", "inputs = [\"a.gltf\", 3]\n"),
@@ -157,10 +160,12 @@ fn mistakes_in_config_files_are_answered_as_recorded_and_render_nothing() {
 fn there_is_a_case_for_every_recorded_message() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/messages");
     let known = TYPED.iter().map(|case| case.0).chain(CONFIGS.iter().map(|case| case.0));
-    let single = ["not-utf-8", "missing", "is-a-folder", "without-inputs", "block-unused"].map(|n| format!("config-{n}"));
+    let single =
+        ["not-utf-8", "missing", "is-a-folder", "without-inputs", "block-unused"].map(|n| format!("config-{n}"));
     let mut known: Vec<String> = known.map(Into::into).chain(single).collect();
     known.sort();
-    let stem = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned();
+    let stem =
+        |entry: std::io::Result<fs::DirEntry>| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned();
     let mut files: Vec<String> = fs::read_dir(folder).unwrap().map(stem).collect();
     files.sort();
     assert_eq!(files, known);
@@ -185,7 +190,8 @@ fn names_that_are_not_utf_8_or_have_spaces_and_line_ends_are_rendered_in_any_loc
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         assert_eq!(json["images"][0]["spp"], 2, "{input:?}");
         let folder = root.path().join(OsStr::from_bytes(b"out \xfe"));
-        let files = fs::read_dir(&folder).unwrap().filter(|e| e.as_ref().unwrap().path().extension() == Some("exr".as_ref()));
+        let files =
+            fs::read_dir(&folder).unwrap().filter(|e| e.as_ref().unwrap().path().extension() == Some("exr".as_ref()));
         assert_eq!(files.count(), 1, "{input:?}");
         fs::remove_dir_all(folder).unwrap();
     }

@@ -77,3 +77,31 @@ impl Accel for EmbreeAccel {
         }
     }
 }
+
+/// A usable libembree4.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Located {
+    /// The file, or the name that the system's loader knows it by.
+    pub path: PathBuf,
+    /// Such as `4.4.0`.
+    pub version: String,
+    /// Instruction set of its kernels, such as `avx512`.
+    pub isa: String,
+    /// What was tried before and why it was not used, `path: reason`.
+    pub refused: Vec<String>,
+}
+
+/// The libembree4 that [`EmbreeAccel::build`] would use.
+///
+/// # Errors
+/// There is none: what was tried and why it was not used, `path: reason`.
+pub fn locate(folders: &[PathBuf]) -> Result<Located, Vec<String>> {
+    let library = Library::find(folders).map_err(|e| e.refused.iter().map(ToString::to_string).collect::<Vec<_>>())?;
+    let device = Device::new(&library, "threads=1").map_err(|e| vec![format!("{}: {e}", library.path().display())])?;
+    Ok(Located {
+        path: library.path().to_owned(),
+        version: library.version().to_string(),
+        isa: device.isa().to_owned(),
+        refused: library.refused().iter().map(ToString::to_string).collect(),
+    })
+}

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// More triangles than this are no short list.
-const MOST: usize = 64;
+pub const MOST: usize = 64;
 
 /// A triangle is big when its box has at least this share of the scene's box, by surface area.
 const BIG: f64 = 0.01;

@@ -58,7 +58,7 @@ pub(super) fn accel_name(accel: AccelChoice) -> &'static str {
 }
 
 /// The option's value.
-fn default_light_name(choice: DefaultLight) -> &'static str {
+pub(super) fn default_light_name(choice: DefaultLight) -> &'static str {
     match choice {
         DefaultLight::Auto => "auto",
         DefaultLight::On => "on",

@@ -1,14 +1,16 @@
 //! Reads scenes, one ahead of the one that is rendered.
 
+use super::budget::Grant;
 use super::content::{InputRecord, hash_sources};
+use super::memory::need;
 use super::panics::guarded;
-use super::render_stage::Loaded;
+use super::render_stage::{Loaded, sized};
 use super::report::ImageReport;
 use super::run::{Event, ImageId, Shared, names_of};
 use super::settings::Task;
 use super::up_to_date::Why;
-use crate::load::{LoadTimes, load};
-use crate::render::Progress;
+use crate::load::{LoadEstimate, LoadTimes, load};
+use crate::render::{Phase, Progress};
 use crate::scene::{Scene, SourceFile};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
@@ -40,6 +42,10 @@ pub(super) struct SceneFile {
     pub chosen: Vec<usize>,
     /// Why not all of its images are up to date; empty if nobody asked.
     pub why: String,
+    /// What reading it took.
+    pub reading: LoadEstimate,
+    /// Memory for all of its images, one after the other.
+    pub grant: Option<Arc<Grant>>,
 }
 
 /// What the files hold that a scene was made from: hashed while it is rendered.
@@ -77,37 +83,44 @@ impl LoadStage {
     pub fn run(&self, to_render: &SyncSender<Loaded>) {
         for task in 0..self.shared.settings.tasks.len() {
             // The other end is gone when the run was ended.
-            if self.shared.is_stopped() || to_render.send(self.load(task)).is_err() {
+            if self.shared.is_stopped() {
+                return;
+            }
+            let Some(loaded) = self.load(task) else { return };
+            if to_render.send(loaded).is_err() {
                 return;
             }
         }
     }
 
-    fn load(&self, task: usize) -> Loaded {
+    /// `None`: the run is to end.
+    fn load(&self, task: usize) -> Option<Loaded> {
         let shared = &*self.shared;
         let Task { input, settings } = &shared.settings.tasks[task];
         let planned = settings.cameras.select(&shared.plan.cameras[task]).unwrap_or_else(|_| vec![0]);
         let outputs = shared.plan.namings[task].outputs(&shared.plan.cameras[task], &planned);
         let (id, progress) = shared.start(&self.events, task, &outputs[0]);
-        progress.enter(crate::render::Phase::Loading);
-        let clock = Instant::now();
         let why = match self.kept(task, &planned, &outputs) {
             Ok(reports) => {
                 let later = |output: &PathBuf| shared.start(&self.events, task, output);
                 let ids = std::iter::once((id, Arc::clone(&progress))).chain(outputs[1..].iter().map(later));
                 let kept = ids.zip(reports).map(|((id, progress), report)| (id, progress, report)).collect();
-                return Loaded { task, id, progress, contents: Ok(Contents::Kept(kept)), seconds: 0.0 };
+                return Some(Loaded { task, id, progress, contents: Ok(Contents::Kept(kept)), seconds: 0.0 });
             }
             Err(why) => why,
         };
-        let loaded = match &input.problem {
+        let reading = match &input.problem {
             Some(problem) => Err(problem.to_string()),
-            None => {
-                let load = || load(&input.path, &settings.load).map_err(|error| error.to_string());
-                shared.beside.install(|| guarded(load))
-            }
+            None => shared.memory.check_loading(&input.path, settings),
         };
-        let contents = loaded.and_then(|(mut scene, times)| {
+        // Waits until there is room beside the scene that is rendered.
+        let bytes = reading.as_ref().map_or(0, |reading| reading.bytes);
+        let mut grant = shared.budget.grant(bytes, &shared.stop)?;
+        progress.enter(Phase::Loading);
+        let clock = Instant::now();
+        let contents = reading.and_then(|reading| {
+            let load = || load(&input.path, &settings.load).map_err(|error| error.to_string());
+            let (mut scene, times) = shared.beside.install(|| guarded(load))?;
             if let Some(cameras) = &shared.elsewhere[task].0 {
                 settings.camera_source.replace(&mut scene, cameras);
             }
@@ -115,9 +128,26 @@ impl LoadStage {
             let chosen = settings.cameras.select(&names);
             let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;
             let sources = Sources::hash(&self.shared, std::mem::take(&mut scene.sources));
-            Ok(Contents::Scene(Box::new(SceneFile { scene, sources, times, names, chosen, why })))
+            Ok(SceneFile { scene, sources, times, names, chosen, why, reading, grant: None })
         });
-        Loaded { task, id, progress, contents, seconds: clock.elapsed().as_secs_f64() }
+        let seconds = clock.elapsed().as_secs_f64();
+        let contents = match contents {
+            Ok(mut file) => {
+                // What the most demanding of its images takes; whether that fits is asked for each of them.
+                let of_camera = |&camera: &usize| {
+                    let render = sized(settings, &file.scene, camera);
+                    need(&file.scene, file.reading, &render, settings).peak()
+                };
+                let most = file.chosen.iter().map(of_camera).max().unwrap_or(0);
+                if !grant.resize(most.min(shared.memory.bytes), &shared.stop) {
+                    return None;
+                }
+                file.grant = Some(Arc::new(grant));
+                Ok(Contents::Scene(Box::new(file)))
+            }
+            Err(message) => Err(message),
+        };
+        Some(Loaded { task, id, progress, contents, seconds })
     }
 
     /// The reports of all images of the task if all are up to date; else why not, empty if that needs no saying.

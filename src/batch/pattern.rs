@@ -98,7 +98,8 @@ mod tests {
     #[test]
     fn patterns_mean_scene_files_as_shells_match_them() {
         let root = tempfile::tempdir().unwrap();
-        let names = ["b.gltf", "a.glb", "a.bin", ".hidden.gltf", "[x].gltf", "sub/c.gltf", "sub/deep/d.obj", ".git/e.obj"];
+        let names =
+            ["b.gltf", "a.glb", "a.bin", ".hidden.gltf", "[x].gltf", "sub/c.gltf", "sub/deep/d.obj", ".git/e.obj"];
         for name in names {
             let path = root.path().join(name);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();

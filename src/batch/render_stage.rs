@@ -2,14 +2,16 @@
 
 use super::describe::{blank, describe};
 use super::load_stage::{Contents, SceneFile};
+use super::memory::need;
 use super::panics::guarded;
 use super::report::{ImageReport, Status};
 use super::run::{Event, ImageId, Shared, reported_name};
-use super::settings::Task;
+use super::settings::{FileSettings, Task};
 use super::size::{aspect_note, check_crop, size_for};
 use super::write_stage::{Made, Picture};
 use crate::error::RenderError;
-use crate::render::{Frame, Progress, RenderSettings, render};
+use crate::load::LoadEstimate;
+use crate::render::{Frame, Progress, RenderSettings, render, window};
 use crate::scene::Scene;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
@@ -58,7 +60,7 @@ impl RenderStage {
         let Task { input, settings } = &self.shared.settings.tasks[task];
         let naming = &self.shared.plan.namings[task];
         let image = || Box::new(blank(&input.path, settings));
-        let SceneFile { scene, sources, times, names, chosen, why } = match contents {
+        let SceneFile { scene, sources, times, names, chosen, why, reading, grant } = match contents {
             Ok(Contents::Scene(file)) => *file,
             Ok(Contents::Kept(images)) => {
                 for (id, progress, image) in images {
@@ -112,10 +114,16 @@ impl RenderStage {
                     continue;
                 }
                 made.output = Some(output);
-                match self.image(task, &scene, camera, &made.progress, &mut made.image) {
+                match self.image(task, &scene, reading, camera, &made.progress, &mut made.image) {
                     Ok(frame) => {
                         made.picture = frame.map(|(frame, settings)| {
-                            Box::new(Picture { frame, settings, camera, sources: Arc::clone(&sources) })
+                            Box::new(Picture {
+                                frame,
+                                settings,
+                                camera,
+                                sources: Arc::clone(&sources),
+                                _grant: grant.clone(),
+                            })
                         });
                     }
                     Err(Interrupted) => return Err(Ended),
@@ -135,6 +143,7 @@ impl RenderStage {
         &self,
         task: usize,
         scene: &Scene,
+        reading: LoadEstimate,
         camera: usize,
         progress: &Progress,
         image: &mut ImageReport,
@@ -145,12 +154,17 @@ impl RenderStage {
             return Ok(None);
         }
         let file = &*self.shared.settings.tasks[task].settings;
-        let mut settings = RenderSettings { threads: None, ..file.render.clone() };
-        (settings.width, settings.height) = size_for(file.size, scene, camera);
+        let settings = sized(file, scene, camera);
         (image.width, image.height) = (Some(settings.width), Some(settings.height));
         image.notes.extend(aspect_note(file.size, scene, camera));
         let mut is_interrupted = false;
-        let rendered = match settings.crop.map_or(Ok(()), |c| check_crop(c, settings.width, settings.height)) {
+        let fits = || {
+            settings.crop.map_or(Ok(()), |c| check_crop(c, settings.width, settings.height))?;
+            let window = window(&settings);
+            let need = need(scene, reading, &settings, file);
+            self.shared.memory.check(&need, Some((window.width, window.height)))
+        };
+        let rendered = match fits() {
             Err(message) => Err(message),
             Ok(()) => self.pool.install(|| {
                 guarded(|| {
@@ -173,6 +187,12 @@ impl RenderStage {
             }
         }
     }
+}
+
+/// The settings of a camera's picture.
+pub(super) fn sized(file: &FileSettings, scene: &Scene, camera: usize) -> RenderSettings {
+    let (width, height) = size_for(file.size, scene, camera);
+    RenderSettings { width, height, threads: None, ..file.render.clone() }
 }
 
 /// The run is to end.

@@ -3,12 +3,15 @@
 //! The thread that calls [`run()`] plans, tells its [`Observer`] what the others report, and ends them when it is asked
 //! to. Images are finished in the order of the plan.
 
+use super::budget::Budget;
 use super::content::HashCache;
 use super::describe::{accel_name, blank};
 use super::fingerprint::{CameraOrigin, Wanted};
+use super::html;
 use super::input::Input;
 use super::job::{Plan, plan};
 use super::load_stage::LoadStage;
+use super::memory::MemoryBudget;
 use super::output::{WriteError, check_writable, sweep, write_atomic};
 use super::render_stage::RenderStage;
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Status};
@@ -98,6 +101,10 @@ pub(super) struct Shared {
     pub elsewhere: Vec<(Option<Arc<[Camera]>>, CameraOrigin)>,
     /// Contents of files that were hashed.
     pub hashes: HashCache,
+    /// Memory that may be used.
+    pub memory: MemoryBudget,
+    /// Who uses it.
+    pub budget: Arc<Budget>,
     /// Ends what is under way.
     pub stop: Arc<AtomicBool>,
     /// For what goes on beside rendering, whose own pool is busy.
@@ -210,12 +217,13 @@ const STACK: usize = 8 << 20;
 /// When one of the run's own threads does, which is a bug.
 pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
-    let hashes = HashCache::default();
+    let (hashes, memory) = (HashCache::default(), MemoryBudget::new(settings.memory));
     let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
     for Task { settings, .. } in &settings.tasks {
         if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
             check_crop(crop, width, height).map_err(Stop::Usage)?;
         }
+        memory.check_picture(settings).map_err(Stop::Usage)?;
     }
     let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
     let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
@@ -232,6 +240,8 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         plan,
         elsewhere,
         hashes,
+        memory,
+        budget: Budget::new(memory.bytes),
         stop: Arc::default(),
         beside,
         next_id: AtomicU64::new(0),
@@ -271,8 +281,14 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         counts: Status::ALL.iter().map(|&status| (status, count(status))).collect(),
         images,
     };
-    if let Err(error) = write_atomic(&settings.out.join("batch.json"), report::to_json(&report).as_bytes()) {
-        unwritable.get_or_insert(error);
+    let mut files = vec![("batch.json", report::to_json(&report))];
+    if settings.report {
+        files.push(("index.html", html::report(&report, &settings.out)));
+    }
+    for (name, text) in files {
+        if let Err(error) = write_atomic(&settings.out.join(name), text.as_bytes()) {
+            unwritable.get_or_insert(error);
+        }
     }
     let strict = report.images.iter().filter(|image| !image.strict_failures().is_empty());
     let strict_failures = if settings.strict { strict.count() } else { 0 };
@@ -280,7 +296,7 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
 }
 
 /// The cameras that each task is to be seen by, if not by its own; read once for all tasks that share settings.
-fn cameras_from_elsewhere(
+pub(super) fn cameras_from_elsewhere(
     tasks: &[Task],
     hashes: &HashCache,
 ) -> Result<Vec<(Option<Arc<[Camera]>>, CameraOrigin)>, String> {

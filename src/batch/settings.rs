@@ -2,6 +2,7 @@
 
 use super::input::Input;
 use super::job::CameraChoice;
+use super::memory::MemoryLimit;
 use super::names::NameTemplate;
 use super::picture::FileOptions;
 use super::size::PictureSize;
@@ -49,6 +50,8 @@ pub struct BatchSettings {
     pub out: PathBuf,
     /// Threads that render; `None` = the cores this process may use.
     pub threads: Option<usize>,
+    /// Memory that may be used; `None` = [`super::memory::DEFAULT_SHARE`] of what this process may use.
+    pub memory: Option<MemoryLimit>,
     /// Render even what is up to date.
     pub force: bool,
     /// Count lost content, dropped samples and empty scenes as failures.

@@ -1,5 +1,6 @@
 //! Writes the pictures that were rendered, EXR first, the report last: it says what the others hold.
 
+use super::budget::Grant;
 use super::develop::develop;
 use super::fingerprint::Fingerprint;
 use super::load_stage::Sources;
@@ -37,6 +38,8 @@ pub(super) struct Picture {
     /// Its place among the scene's.
     pub camera: usize,
     pub sources: Arc<Sources>,
+    /// Held until it is written.
+    pub _grant: Option<Arc<Grant>>,
 }
 
 /// The thread that writes.
@@ -99,7 +102,7 @@ impl WriteStage {
         output: &Path,
         image: &mut ImageReport,
     ) -> Result<(), WriteError> {
-        let Picture { frame, settings, camera, sources } = picture;
+        let Picture { frame, settings, camera, sources, _grant } = picture;
         let files = self.shared.settings.tasks[task].settings.files;
         match sources.records() {
             Ok(inputs) => {

@@ -4,5 +4,6 @@ pub mod decode;
 pub mod exr;
 mod exr_header;
 pub mod exr_read;
+pub mod header;
 pub mod old;
 pub mod png;

@@ -9,7 +9,7 @@ use glam::DVec3;
 use std::f64::consts::{PI, TAU};
 
 /// Texels across and down: 1.4 degrees each, a fraction of the boxes' soft edges.
-const SIZE: [u32; 2] = [256, 128];
+pub const SIZE: [u32; 2] = [256, 128];
 
 /// Radiance of the dome, nits, straight up, at the horizon and straight down.
 const ZENITH: f64 = 0.40;

@@ -1,10 +1,12 @@
 //! Files to [`Scene`]s, by extension.
 
+mod estimate;
 mod folders;
 pub mod gltf;
 pub mod obj;
 mod tangents;
 
+pub use estimate::{LoadEstimate, estimate};
 pub use folders::Folders;
 
 use crate::camera::Camera;

@@ -1,14 +1,11 @@
 //! One frame: prepare, trace, develop.
 
-use super::framing::{framing_camera, vector_area};
+use super::features::features;
 use super::prepare::prepare;
-use super::{CropWindow, Filter, Frame, FrameCamera, Phase, Progress, RenderSettings, RenderStats, schedule};
-use crate::camera::{CameraRays, PixelFilter};
+use super::{Frame, FrameCamera, Phase, Progress, RenderSettings, RenderStats, schedule, tracer};
 use crate::error::RenderError;
 use crate::film::{Film, Tile};
-use crate::integrator::PathTracer;
 use crate::scene::Scene;
-use simd::Level;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -59,39 +56,10 @@ fn render_here(
         return Err(RenderError::Interrupted);
     }
 
-    let framed;
-    let camera = if scene.cameras.is_empty() {
-        let aspect = f64::from(width) / f64::from(height);
-        framed = framing_camera(prepared.bounds, vector_area(scene), aspect);
-        &framed
-    } else {
-        &scene.cameras[camera]
-    };
-    let window = settings.crop.unwrap_or(CropWindow { x: 0, y: 0, width, height });
+    let camera = tracer::camera(scene, camera, &prepared, settings);
+    let window = tracer::window(settings);
     let film = Film::new(Tile { x: window.x, y: window.y, width: window.width, height: window.height }, settings.spp);
-    let level = match settings.lanes {
-        None => Level::best(),
-        Some(1) => Level::Scalar,
-        Some(8) => Level::best_of_8(),
-        Some(16) => Level::Avx512,
-        Some(n) => panic!("{n} lanes; allowed: 1, 8, 16"),
-    }
-    .without_portable();
-    let tracer = PathTracer {
-        tables: &prepared.tables,
-        accel: &*prepared.accel,
-        camera: CameraRays::new(camera, width, height, prepared.origin),
-        filter: match settings.filter {
-            Filter::Box { width } => PixelFilter::Box { radius: 0.5 * width },
-            Filter::Tent { width } => PixelFilter::Tent { radius: 0.5 * width },
-        },
-        max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
-        is_capped: settings.max_bounces.is_none(),
-        cull_backfaces: settings.cull_backfaces,
-        seed: settings.seed,
-        frame: settings.frame,
-        level,
-    };
+    let tracer = tracer::tracer(&prepared, &camera, settings);
     let paths = u64::from(window.width) * u64::from(window.height) * u64::from(settings.spp);
     progress.total.store(paths, Ordering::Relaxed);
     progress.enter(Phase::Rendering);
@@ -103,6 +71,8 @@ fn render_here(
     let pixels = film.mean();
     let render_seconds = start.elapsed().as_secs_f64();
 
+    let features = features(scene, &prepared);
+    let lanes = tracer.level.lanes();
     let mut warnings = prepared.warnings;
     if totals.non_finite > 0 {
         let places: Vec<_> = totals
@@ -125,21 +95,10 @@ fn render_here(
         triangles: tables.triangles.len() as u64,
         instances: scene.instances.len() as u64,
         lights: tables.lights.len() as u64,
-        features: vec![
-            ("emissive_surfaces", tables.lights.has_triangles()),
-            ("punctual_lights", !scene.lights.is_empty()),
-            ("environment", tables.lights.has_environment()),
-            ("default_light", prepared.default_light.used),
-            ("textures", !scene.textures.is_empty()),
-            ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
-            ("normal_maps", tables.triangles.has_tangents()),
-            ("alpha", tables.materials.has_alpha()),
-            ("unlit", tables.materials.has_unlit()),
-            ("vertex_colors", tables.triangles.has_colors()),
-        ],
+        features,
         default_light: prepared.default_light,
         accel: prepared.accel_report,
-        lanes: level.lanes(),
+        lanes,
         warnings,
         losses: prepared.losses,
     };

@@ -2,19 +2,26 @@
 
 mod default_light;
 mod emission;
+mod features;
 mod frame;
 mod framing;
+pub mod memory;
+mod pilot;
 mod prepare;
 mod progress;
 mod schedule;
 mod settings;
+mod tracer;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
+pub use features::features;
 pub use frame::{pool, render};
 pub use framing::FRAMING_YFOV;
+pub use pilot::{Pilot, pilot};
 pub use prepare::{Prepared, prepare};
 pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
+pub use tracer::{camera, window};
 
 /// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
 #[derive(Clone, Copy, Debug)]

@@ -25,7 +25,9 @@ fn run() -> ExitCode {
     let matches = match unbuilt::add_to(args::Cli::command()).try_get_matches() {
         Ok(matches) => matches,
         Err(error) => match hyphen_file().filter(|_| error.kind() == ErrorKind::UnknownArgument) {
-            Some(file) => return term::usage(&format!("{file} is no option\n  For the file of that name write ./{file}.")),
+            Some(file) => {
+                return term::usage(&format!("{file} is no option\n  For the file of that name write ./{file}."));
+            }
             None => error.exit(),
         },
     };
@@ -47,6 +49,7 @@ fn run() -> ExitCode {
     match (cli.command, matches.subcommand()) {
         (Some(args::Command::Compare(options)), _) => commands::compare::run(&options),
         (Some(args::Command::Retone(options)), _) => commands::retone::run(&options),
+        (Some(args::Command::Doctor(options)), _) => commands::doctor::run(&options),
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),
     }

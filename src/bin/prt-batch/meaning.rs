@@ -169,7 +169,7 @@ fn camera_source(args: &FileArgs) -> Result<CameraSource, String> {
 
 /// Where libembree4 may lie beside this program: an installation's folders, the project's when run from its target
 /// folder, and the current folder's.
-fn embree_dirs() -> Vec<PathBuf> {
+pub fn embree_dirs() -> Vec<PathBuf> {
     let mut dirs = Vec::new();
     if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
         dirs.extend([folder.join(".embree"), folder.join("../lib")]);

@@ -3,7 +3,7 @@
 use crate::generate::Product;
 use crate::words::Words;
 use clap::builder::{PossibleValue, TypedValueParser};
-use prt::batch::{job::CameraChoice, names::NameTemplate};
+use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
@@ -81,6 +81,10 @@ pub fn seed(value: &str) -> Result<u64, String> {
 
 pub fn max_bounces(value: &str) -> Result<u32, String> {
     number(value, 0, prt::render::RenderSettings::BOUNCE_CAP)
+}
+
+pub fn memory(value: &str) -> Result<MemoryLimit, String> {
+    value.parse()
 }
 
 pub fn threads(value: &str) -> Result<usize, String> {

@@ -14,12 +14,7 @@ struct Unbuilt {
     meaning: &'static str,
 }
 
-const fn option(
-    heading: &'static str,
-    name: &'static str,
-    value: &'static str,
-    meaning: &'static str,
-) -> Unbuilt {
+const fn option(heading: &'static str, name: &'static str, value: &'static str, meaning: &'static str) -> Unbuilt {
     Unbuilt { name, value, heading, meaning }
 }
 
@@ -46,7 +41,12 @@ const OPTIONS: &[Unbuilt] = &[
         "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
     ),
     option("Sampling", "texture-lod", "", "Ray-cone level of detail (biased)"),
-    option("Light", "env", "FILE.hdr|.exr", "Equirectangular environment; with it --default-light auto is off [default: none]"),
+    option(
+        "Light",
+        "env",
+        "FILE.hdr|.exr",
+        "Equirectangular environment; with it --default-light auto is off [default: none]",
+    ),
     option("Light", "env-rotate", "DEG", "Its rotation, counter-clockwise about +Y seen from above [default: 0]"),
     option("Light", "env-scale", "S", "Factor on its radiance [default: 1]"),
     option(
@@ -60,8 +60,13 @@ const OPTIONS: &[Unbuilt] = &[
     option("Lens", "focus-on", "NODE", "Focus on a node in place of a distance"),
     option("Lens", "aperture-blades", "N", "Corners of the aperture [default: from the file, else round]"),
     option("Lens", "sensor", "MM", "The longer side of the image [default: from the file, else 36]"),
-    option("Files", "aov", "LIST", "EXR layers out of albedo,normal,depth,position,uv,object-id,material-id,cryptomatte,\
-         variance,samples [default: none]"),
+    option(
+        "Files",
+        "aov",
+        "LIST",
+        "EXR layers out of albedo,normal,depth,position,uv,object-id,material-id,cryptomatte,\
+         variance,samples [default: none]",
+    ),
     option("Files", "transparent", "", "Alpha from coverage; background not in the beauty [default: off: alpha 1]"),
     option(
         "Animation",
@@ -72,15 +77,18 @@ const OPTIONS: &[Unbuilt] = &[
     ),
     option("Animation", "fps", "N", "Frames a second [default: 24]"),
     option("Animation", "animation", "INDEX|NAME|all", "Which animation [default: 0]"),
-    option("Animation", "shutter", "FRACTION", "Share of a frame that the shutter is open [default: from the file, else 0]"),
+    option(
+        "Animation",
+        "shutter",
+        "FRACTION",
+        "Share of a frame that the shutter is open [default: from the file, else 0]",
+    ),
     option("Animation", "shutter-position", "start|center|end", "Where the open shutter lies [default: center]"),
-    option("Run", "memory", "8GiB", "Refused before allocation beyond it [default: 80 % of memory]"),
-    option("Run", "explain", "", "Print the plan of each image, what is skipped and why; render nothing"),
     option("Terminal", "display", "HOST:PORT", "Show pictures as they grow in tev"),
 ];
 
 /// Commands.
-const COMMANDS: &[&str] = &["bench", "verify", "doctor"];
+const COMMANDS: &[&str] = &["bench", "verify"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {

@@ -14,7 +14,7 @@ use std::io::Read;
 
 /// Elements that an accessor without a buffer view may have: zeros cost the file nothing and us up to 16 bytes each, so
 /// without a bound a file of a kilobyte could ask for all memory (1 GiB at this bound).
-const MAX_ZEROS: u64 = 1 << 26;
+pub(super) const MAX_ZEROS: u64 = 1 << 26;
 /// Bytes read and converted at a time: fits the second-level cache.
 const CHUNK: usize = 1 << 18;
 

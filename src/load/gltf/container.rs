@@ -31,6 +31,19 @@ pub(super) fn read(path: &Path) -> Result<Container> {
     Input { path, file: &mut file, length }.container()
 }
 
+/// Bytes of the JSON of `path` as its header has it, without reading it; `None` if it cannot be read.
+pub(super) fn json_length(path: &Path) -> Option<u64> {
+    let (mut file, length) = open_file(path).ok()?;
+    let mut header = [0; 16];
+    match file.read_exact(&mut header) {
+        Ok(()) if header.starts_with(MAGIC) => {
+            let [.., a, b, c, d] = header;
+            Some(u64::from(u32::from_le_bytes([a, b, c, d])).min(length))
+        }
+        _ => Some(length),
+    }
+}
+
 /// A file that is being taken apart.
 struct Input<'a, F> {
     /// For messages.

@@ -11,6 +11,7 @@ mod camera;
 mod check;
 mod container;
 mod document;
+mod estimate;
 mod extensions;
 mod image;
 mod instancing;
@@ -20,6 +21,7 @@ mod material;
 mod mesh;
 mod morph;
 mod node;
+mod outline;
 mod primitive;
 mod semantic;
 mod skin;
@@ -27,6 +29,8 @@ mod texture;
 mod texture_info;
 mod topology;
 mod uri;
+
+pub(super) use estimate::estimate;
 
 use super::{LoadOptions, LoadTimes};
 use crate::camera::Camera;

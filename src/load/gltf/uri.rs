@@ -80,7 +80,7 @@ fn scheme(uri: &str) -> Option<&str> {
 }
 
 /// The text with `%xx` replaced by bytes, which must be UTF-8.
-fn percent_decode(uri: &str) -> std::result::Result<String, String> {
+pub(super) fn percent_decode(uri: &str) -> std::result::Result<String, String> {
     String::from_utf8(percent_bytes(uri)?).map_err(|_| "is not UTF-8 when its %xx are replaced".into())
 }
 

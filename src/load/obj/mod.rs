@@ -5,6 +5,7 @@
 //! as written (`mtl`, `map`), their pictures found and decoded (`files`), and turned into glTF's terms (`material`,
 //! `texture`). What is wrong in the geometry is an error, what is wrong in a material a warning; both name their place.
 
+mod estimate;
 mod files;
 mod geometry;
 mod map;
@@ -17,6 +18,8 @@ mod statement;
 mod text;
 mod texture;
 mod vertices;
+
+pub(super) use estimate::estimate;
 
 use super::folders::{Folders, read_file};
 use super::tangents::{self, TooManyTriangles};

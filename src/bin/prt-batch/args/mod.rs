@@ -5,11 +5,13 @@
 //! tables. A default that clap does not know stands at the end of the first paragraph as `[default: ...]`.
 
 mod compare;
+mod doctor;
 mod file;
 mod retone;
 mod run;
 
 pub use compare::CompareArgs;
+pub use doctor::DoctorArgs;
 pub use file::FileArgs;
 pub use retone::RetoneArgs;
 pub use run::RunArgs;
@@ -79,6 +81,8 @@ pub enum Command {
     /// Tone-map stored EXRs again, no rendering.
     #[command(after_long_help = EXAMPLES_OF_RETONE)]
     Retone(RetoneArgs),
+    /// What was found on this machine: processors, memory, Embree; and whether the ray backends work.
+    Doctor(DoctorArgs),
 }
 
 #[derive(Args, Debug)]

@@ -2,6 +2,7 @@
 
 use crate::parse::{self, ProgressStyle};
 use clap::{Args, ValueHint};
+use prt::batch::memory::MemoryLimit;
 use std::path::PathBuf;
 
 const RUN: &str = "Run";
@@ -25,6 +26,17 @@ pub struct RunArgs {
     /// From 1 to 4096; more than the cores gives a warning.
     #[arg(short, long, value_name = "N", value_parser = parse::threads, help_heading = RUN)]
     pub threads: Option<usize>,
+    /// Memory that may be used, such as 8GiB or 50%; what would need more is refused [default: 80%]
+    ///
+    /// Before it is allocated. KiB MiB GiB TiB, KB MB GB TB, in bytes, or a share of what this process may use (the
+    /// machine's memory, less where a container limits it); see "Memory" below.
+    #[arg(long, value_name = "AMOUNT", value_parser = parse::memory, allow_hyphen_values = true, help_heading = RUN)]
+    pub memory: Option<MemoryLimit>,
+    /// Print the plan of each image; render nothing
+    ///
+    /// With what is skipped and why, memory and time; with --json as JSON. See "The plan" below.
+    #[arg(long, help_heading = RUN)]
+    pub explain: bool,
     /// Render even what is up to date
     ///
     /// Up-to-date outputs are kept and reported so; what is up to date is said in docs/cli.md.
@@ -35,7 +47,7 @@ pub struct RunArgs {
     /// Dropped non-finite samples, missed error targets, empty scenes and lost content give exit code 1.
     #[arg(long, help_heading = RUN)]
     pub strict: bool,
-    /// Write no index.html (which is not built yet)
+    /// Write no index.html, the contact sheet of the run
     ///
     /// JSON is always written.
     #[arg(long, help_heading = RUN)]

@@ -1,6 +1,8 @@
 //! One file per command.
 
 pub mod compare;
+pub mod doctor;
+pub mod explain;
 mod exr_files;
 pub mod render;
 pub mod retone;

@@ -19,12 +19,16 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         tasks,
         out: args.out.clone(),
         threads: args.threads,
+        memory: args.memory,
         force: args.force,
         strict: args.strict,
         report: !args.no_report,
         command: command_line(),
         ..BatchSettings::default()
     };
+    if args.explain {
+        return super::explain::run(&settings, args.json);
+    }
     let verbosity = match (args.quiet, args.verbose) {
         (true, _) => Verbosity::Quiet,
         (_, true) => Verbosity::Verbose,

@@ -115,7 +115,8 @@ impl Reader<'_> {
 
     /// One string or several, with their places.
     fn strings(&self, value: &Spanned<DeValue<'_>>, key: &str, example: &str) -> Result<Vec<(String, String)>, String> {
-        let wrong = |at: usize| format!("{}: {key} must be a string or a list of strings, such as {example}", self.place(at));
+        let wrong =
+            |at: usize| format!("{}: {key} must be a string or a list of strings, such as {example}", self.place(at));
         let start = value.span().start;
         let one = |value: &Spanned<DeValue<'_>>| match value.get_ref() {
             DeValue::String(text) if !text.is_empty() => Ok((text.to_string(), self.place(value.span().start))),
@@ -178,7 +179,11 @@ impl Reader<'_> {
             None => OsString::from(format!("--{name}")),
             Some(text) => {
                 let mut argument = OsString::from(format!("--{name}="));
-                argument.push(if layer::is_path(arg) { self.folder().join(text).into_os_string() } else { text.into() });
+                argument.push(if layer::is_path(arg) {
+                    self.folder().join(text).into_os_string()
+                } else {
+                    text.into()
+                });
                 argument
             }
         });
@@ -197,7 +202,9 @@ impl Reader<'_> {
         let known = self.definition.names().chain(["inputs", "file"]);
         match short().or_else(|| nearest(&name.replace('_', "-"), known)) {
             Some(meant) => format!("there is no option {name}\n  Did you mean {meant}?"),
-            None => format!("there is no option {name}\n  Allowed are the long names in prt-batch --help, without dashes."),
+            None => {
+                format!("there is no option {name}\n  Allowed are the long names in prt-batch --help, without dashes.")
+            }
         }
     }
 

@@ -21,7 +21,10 @@ impl FilePattern {
         let is_placed = text.starts_with("./") || text.starts_with("../") || Path::new(text).is_absolute();
         let whole = if is_placed { resolved(text, folder) } else { format!("**/{text}") };
         Pattern::new(&whole).map(Self).map_err(|error| {
-            format!("is no pattern: {}\n  Allowed: * and ? within a name, ** for any folders, [abc], [!abc]; [[] is [.", error.msg)
+            format!(
+                "is no pattern: {}\n  Allowed: * and ? within a name, ** for any folders, [abc], [!abc]; [[] is [.",
+                error.msg
+            )
         })
     }
 

@@ -18,7 +18,8 @@ pub fn tables(mut command: Command) -> String {
 fn table(command: &Command) -> String {
     let [before, after] = markers(command.get_name());
     let mut text = format!("{before}\n| option | meaning | default | built |\n|---|---|---|---|\n");
-    let args: Vec<_> = command.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str())).collect();
+    let args: Vec<_> =
+        command.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str())).collect();
     // In the order of the definition; what is not built comes last, so after what is built of its heading.
     let mut headings: Vec<Option<&str>> = Vec::new();
     for arg in &args {
@@ -96,7 +97,8 @@ fn split_default(help: &str) -> (String, Option<String>) {
 fn prose(text: &str) -> String {
     let word = |word: &str| {
         let core = word.trim_start_matches(['(', '"']).trim_end_matches([')', ',', '.', ';', ':', '"']);
-        let is_code = ["--", "{", ".", "*"].iter().any(|start| core.starts_with(start)) || core == "?" || core.starts_with('[');
+        let is_code =
+            ["--", "{", ".", "*"].iter().any(|start| core.starts_with(start)) || core == "?" || core.starts_with('[');
         match word.find(core).filter(|_| is_code) {
             Some(at) => format!("{}`{core}`{}", &word[..at], &word[at + core.len()..]),
             None => word.to_owned(),

@@ -1,0 +1,484 @@
+//! `--explain`: what a run would do with each image, found out without rendering or writing anything. Scenes are loaded
+//! and prepared, and a tenth of a second of paths is traced to tell how long the rest will take.
+
+use super::content::HashCache;
+use super::describe::{accel_name, default_light_name};
+use super::fingerprint::{CameraOrigin, Wanted};
+use super::job::{Plan, plan};
+use super::memory::{MemoryBudget, need};
+use super::panics::guarded;
+use super::report::{Accel, DefaultLight, Outputs};
+use super::run::{Stop, cameras_from_elsewhere, names_of, reported_name};
+use super::settings::{BatchSettings, FileSettings, Task};
+use super::size::{PictureSize, aspect_note, check_crop, size_for};
+use super::up_to_date::check;
+use super::view::CameraSource;
+use crate::camera::{Camera, Projection};
+use crate::light::Light;
+use crate::load::{LoadEstimate, LoadTimes, load};
+use crate::render::memory::{MemoryEstimate, texel_bytes};
+use crate::render::{self, Prepared, RenderSettings, features, pilot, prepare};
+use crate::scene::{Scene, Skipped};
+use crate::texture::{Image, Texels};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// What would come of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prospect {
+    /// It would be rendered.
+    #[default]
+    Render,
+    /// Its files are up to date and would be kept.
+    Keep,
+    /// Nothing to draw: no picture, no failure.
+    Empty,
+    /// It would fail; `problem` says why.
+    Fail,
+}
+
+/// The plan of one image. What is not known, because the image would fail before, is null or empty.
+#[derive(Clone, Debug, Default, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Explanation {
+    pub input: String,
+    pub prospect: Prospect,
+    pub problem: Option<String>,
+    /// Why the files on disk would be kept, or rendered again; null where nobody looked.
+    pub up_to_date: Option<String>,
+    pub scene: Option<usize>,
+    pub camera: Option<CameraPlan>,
+    pub outputs: Outputs,
+    pub width: Option<u32>,
+    pub height: Option<u32>,
+    /// X, Y, width, height.
+    pub crop: Option<[u32; 4]>,
+    pub spp: u32,
+    pub paths: Option<u64>,
+    pub seed: u64,
+    pub accel: Accel,
+    /// Why `auto` does not take Embree; empty if it does.
+    pub accel_note: String,
+    /// Big triangles tested by packets of rays before the backend.
+    pub front_triangles: Option<u64>,
+    pub features: BTreeMap<String, bool>,
+    pub triangles: Option<TrianglePlan>,
+    pub meshes: Option<usize>,
+    pub instances: Option<usize>,
+    pub materials: Option<usize>,
+    pub textures: Vec<TexturePlan>,
+    pub texture_bytes: u64,
+    pub lights: Option<LightPlan>,
+    pub default_light: Option<DefaultLight>,
+    pub memory: Option<MemoryPlan>,
+    pub seconds: SecondsPlan,
+    pub skipped: Vec<Skipped>,
+    pub warnings: Vec<String>,
+    pub losses: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+/// The camera of an image.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct CameraPlan {
+    /// Its place among the scene's cameras; null for the one framed on the bounds.
+    pub index: Option<usize>,
+    pub name: Option<String>,
+    /// `file`, `bounds`, or the option that gives it.
+    pub from: String,
+    /// `perspective` or `orthographic`.
+    pub projection: &'static str,
+    /// Degrees; null for an orthographic camera.
+    pub yfov: Option<f64>,
+    /// Metres, world space.
+    pub eye: [f64; 3],
+}
+
+/// How many triangles.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct TrianglePlan {
+    /// Of all meshes that the scene uses, each once.
+    pub file: u64,
+    /// With every instance of a mesh.
+    pub placed: u64,
+    /// Without those that have no area or are out of range once placed.
+    pub traced: u64,
+}
+
+/// An image that textures read.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct TexturePlan {
+    pub name: String,
+    pub width: u32,
+    pub height: u32,
+    /// Kept of it: 1, 2 or 4.
+    pub channels: usize,
+    /// A channel.
+    pub bits: u32,
+    pub bytes: u64,
+}
+
+/// Lights by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct LightPlan {
+    /// Those that are sampled.
+    pub emissive_triangles: u64,
+    pub point: usize,
+    pub spot: usize,
+    pub directional: usize,
+    /// Of the scene's own or the built-in studio.
+    pub environment: bool,
+}
+
+/// Estimated bytes, at most and by part.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct MemoryPlan {
+    pub peak: u64,
+    #[serde(flatten)]
+    pub parts: MemoryEstimate,
+    /// What `--memory` allows; null where there is no limit.
+    pub budget: Option<u64>,
+}
+
+/// Seconds of wall clock: those of loading and building as they were just now, the others estimated.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct SecondsPlan {
+    pub load: Option<f64>,
+    pub decode: Option<f64>,
+    pub build: Option<f64>,
+    pub render: Option<f64>,
+    pub write: Option<f64>,
+    pub total: Option<f64>,
+    /// Rays a second that the estimate of `render` follows from, in millions.
+    pub mrays_per_s: Option<f64>,
+}
+
+/// How the planning went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Explained {
+    /// Images.
+    pub images: usize,
+    /// Those of them that would fail.
+    pub failing: usize,
+    /// Inputs that cannot be read.
+    pub bad_inputs: usize,
+    /// Inputs.
+    pub inputs: usize,
+}
+
+impl Explained {
+    /// As a run of the same images would end: 0, 1 some would fail, 3 every input is bad.
+    pub fn exit_code(&self) -> u8 {
+        match () {
+            () if self.inputs > 0 && self.bad_inputs == self.inputs => 3,
+            () if self.failing > 0 => 1,
+            () => 0,
+        }
+    }
+}
+
+/// Tells `told` the plan of every image that [`super::run()`] would make, in the same order. Nothing is rendered and
+/// nothing is written, not even a folder.
+///
+/// # Errors
+/// What stops a run before anything is rendered, but for the output folder, which is not touched.
+pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> Result<Explained, Stop> {
+    let hashes = HashCache::default();
+    let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
+    for Task { settings, .. } in &settings.tasks {
+        if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
+            check_crop(crop, width, height).map_err(Stop::Usage)?;
+        }
+    }
+    let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
+    let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
+    let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
+    let budget = MemoryBudget::new(settings.memory);
+    let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
+    for (task, (cameras, origin)) in elsewhere.iter().enumerate() {
+        let elsewhere = cameras.as_ref();
+        let one = File { run: settings, plan: &plan, task, elsewhere, origin, hashes: &hashes, budget };
+        let mut count = |explanation: Explanation| {
+            explained.images += 1;
+            explained.failing += usize::from(explanation.prospect == Prospect::Fail);
+            told(explanation);
+        };
+        match pool.install(|| guarded(|| one.load())) {
+            Ok((scene, times, reading)) => {
+                pool.install(|| one.images(&scene, times, reading)).into_iter().for_each(&mut count);
+            }
+            Err(problem) => {
+                explained.bad_inputs += 1;
+                let explanation = Explanation { prospect: Prospect::Fail, problem: Some(problem), ..one.blank() };
+                explained.images += 1;
+                explained.failing += 1;
+                told(explanation);
+            }
+        }
+    }
+    Ok(explained)
+}
+
+/// One input of a run.
+#[derive(Clone, Copy)]
+struct File<'a> {
+    run: &'a BatchSettings,
+    plan: &'a Plan,
+    task: usize,
+    elsewhere: Option<&'a Arc<[Camera]>>,
+    origin: &'a CameraOrigin,
+    hashes: &'a HashCache,
+    budget: MemoryBudget,
+}
+
+impl File<'_> {
+    fn settings(&self) -> &FileSettings {
+        &self.run.tasks[self.task].settings
+    }
+
+    /// What is known before anything is read.
+    fn blank(&self) -> Explanation {
+        let (input, render) = (&self.run.tasks[self.task].input, &self.settings().render);
+        Explanation {
+            input: input.path.display().to_string(),
+            spp: render.spp,
+            seed: render.seed,
+            crop: render.crop.map(|c| [c.x, c.y, c.width, c.height]),
+            accel: Accel { requested: accel_name(render.accel).into(), ..Accel::default() },
+            ..Explanation::default()
+        }
+    }
+
+    /// The scene, unless reading it would take more memory than there may be used.
+    fn load(&self) -> Result<(Scene, LoadTimes, LoadEstimate), String> {
+        let (input, settings) = (&self.run.tasks[self.task].input, self.settings());
+        if let Some(problem) = &input.problem {
+            return Err(problem.to_string());
+        }
+        let reading = self.budget.check_loading(&input.path, settings)?;
+        let (mut scene, times) = load(&input.path, &settings.load).map_err(|error| error.to_string())?;
+        if let Some(cameras) = self.elsewhere {
+            settings.camera_source.replace(&mut scene, cameras);
+        }
+        Ok((scene, times, reading))
+    }
+
+    /// The plans of all chosen cameras of a scene.
+    fn images(&self, scene: &Scene, times: LoadTimes, reading: LoadEstimate) -> Vec<Explanation> {
+        let settings = self.settings();
+        let names = names_of(&scene.cameras);
+        let chosen = match settings.cameras.select(&names) {
+            Ok(chosen) => chosen,
+            Err(error) => {
+                let problem = Some(format!("{}: {error}", self.blank().input));
+                return vec![Explanation { prospect: Prospect::Fail, problem, ..self.blank() }];
+            }
+        };
+        let outputs = self.plan.namings[self.task].outputs(&names, &chosen);
+        let mut prepared = None;
+        let mut all = Vec::with_capacity(chosen.len());
+        for (nth, (&camera, output)) in chosen.iter().zip(outputs).enumerate() {
+            let mut plan = self.blank();
+            self.describe_scene(scene, &mut plan);
+            // As in reports: the file is read for its first image.
+            let times = if nth == 0 { times } else { LoadTimes::default() };
+            (plan.seconds.load, plan.seconds.decode) = (Some(times.load), Some(times.decode));
+            let path = |extension: &str| {
+                let mut path = self.run.out.join(&output).into_os_string();
+                path.push(extension);
+                path.to_string_lossy().into_owned()
+            };
+            plan.outputs = Outputs {
+                exr: settings.files.exr.then(|| path(".exr")),
+                png: settings.files.png.then(|| path(".png")),
+                json: Some(path(".json")),
+            };
+            if self.plan.owners.get(&output).is_some_and(|owner| *owner != self.task) {
+                let output = output.display();
+                fail(&mut plan, format!("{output} belongs to another input; use --name"));
+            } else if let Err(problem) = self.image(scene, camera, reading, &mut prepared, &mut plan) {
+                fail(&mut plan, problem);
+            }
+            self.look_for_earlier(camera, &mut plan);
+            all.push(plan);
+        }
+        all
+    }
+
+    /// Whether an earlier run left what this one would write.
+    fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
+        let (input, settings) = (&self.run.tasks[self.task].input.path, self.settings());
+        let wanted = Wanted { input, settings, origin: self.origin, camera };
+        let json = match &plan.outputs.json {
+            Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
+            _ => return,
+        };
+        match check(Path::new(json), &wanted, self.hashes) {
+            Ok(_) => {
+                plan.prospect = Prospect::Keep;
+                plan.up_to_date = Some("its files are what a run would write".into());
+            }
+            Err(why) => plan.up_to_date = Some(format!("no: {why}")),
+        }
+    }
+
+    /// What a scene is, whoever looks at it.
+    fn describe_scene(&self, scene: &Scene, plan: &mut Explanation) {
+        plan.scene = Some(scene.index);
+        plan.warnings.clone_from(&scene.warnings);
+        plan.losses.clone_from(&scene.losses);
+        plan.skipped.clone_from(&scene.skipped);
+        (plan.meshes, plan.instances) = (Some(scene.meshes.len()), Some(scene.instances.len()));
+        plan.materials = Some(scene.materials.len());
+        plan.textures = scene.images.iter().map(texture).collect();
+        plan.texture_bytes = plan.textures.iter().map(|texture| texture.bytes).sum();
+        let (file, placed) =
+            (scene.meshes.iter().map(|mesh| mesh.indices.len() as u64).sum(), scene.triangle_count() as u64);
+        plan.triangles = Some(TrianglePlan { file, placed, traced: placed });
+    }
+
+    /// The rest; `prepared` is the scene made ready, for the first of its images that needs it.
+    fn image(
+        &self,
+        scene: &Scene,
+        camera: usize,
+        reading: LoadEstimate,
+        prepared: &mut Option<Prepared>,
+        plan: &mut Explanation,
+    ) -> Result<(), String> {
+        let settings = self.settings();
+        let mut render = RenderSettings { threads: None, ..settings.render.clone() };
+        (render.width, render.height) = size_for(settings.size, scene, camera);
+        (plan.width, plan.height) = (Some(render.width), Some(render.height));
+        plan.notes.extend(aspect_note(settings.size, scene, camera));
+        if scene.triangle_count() == 0 {
+            plan.prospect = Prospect::Empty;
+            plan.warnings.push("nothing drawable: the scene has no triangles; no picture would be written".into());
+            return Ok(());
+        }
+        if let Some(crop) = render.crop {
+            check_crop(crop, render.width, render.height)?;
+        }
+        let window = render::window(&render);
+        let paths = u64::from(window.width) * u64::from(window.height) * u64::from(render.spp);
+        plan.paths = Some(paths);
+        let need = need(scene, reading, &render, settings);
+        let budget = Some(self.budget.bytes).filter(|bytes| *bytes < u64::MAX);
+        plan.memory = Some(MemoryPlan { peak: need.peak(), parts: need, budget });
+        let fits = self.budget.check(&need, Some((window.width, window.height)));
+        // A picture that is too large says nothing against preparing its scene.
+        self.budget.check(&MemoryEstimate { film: 0, files: 0, ..need }, None)?;
+        let is_first = prepared.is_none();
+        let start = Instant::now();
+        let prepared = match prepared {
+            Some(prepared) => prepared,
+            None => prepared.insert(guarded(|| prepare(scene, &render).map_err(|error| error.to_string()))?),
+        };
+        plan.seconds.build = Some(if is_first { start.elapsed().as_secs_f64() } else { 0.0 });
+        describe_prepared(scene, prepared, plan);
+        let seen = render::camera(scene, camera, prepared, &render);
+        plan.camera = Some(self.camera(scene, camera, &seen));
+        let trial = guarded(|| Ok(pilot(prepared, &seen, &render)))?;
+        let pixels = (u64::from(window.width) * u64::from(window.height)) as f64;
+        let per_pixel =
+            if settings.files.exr { EXR_SECONDS } else { 0.0 } + if settings.files.png { PNG_SECONDS } else { 0.0 };
+        let seconds = &mut plan.seconds;
+        (seconds.render, seconds.write) = (Some(trial.render_seconds), Some(pixels * per_pixel));
+        let rays = trial.rays as f64 / trial.paths.max(1) as f64 * paths as f64;
+        seconds.mrays_per_s = (trial.render_seconds > 0.0).then(|| rays / trial.render_seconds * 1e-6);
+        let parts = [seconds.load, seconds.decode, seconds.build, seconds.render, seconds.write];
+        seconds.total = Some(parts.into_iter().flatten().sum());
+        fits
+    }
+
+    fn camera(&self, scene: &Scene, index: usize, camera: &Camera) -> CameraPlan {
+        let (projection, yfov) = match camera.projection {
+            Projection::Perspective { yfov, .. } => ("perspective", Some(yfov.to_degrees())),
+            Projection::Orthographic { .. } => ("orthographic", None),
+        };
+        let is_framed = scene.cameras.is_empty();
+        CameraPlan {
+            index: (!is_framed).then_some(index),
+            name: reported_name(&names_of(&scene.cameras), index),
+            from: match &self.settings().camera_source {
+                CameraSource::Inputs if is_framed => "bounds".into(),
+                CameraSource::Inputs => "file".into(),
+                other => other.options(),
+            },
+            projection,
+            yfov,
+            eye: camera.world_from_camera.w_axis.truncate().to_array(),
+        }
+    }
+}
+
+/// Wall seconds a pixel that encoding and writing take, measured on one core of a server of 2023 (ZIP; noise compresses
+/// worst).
+const EXR_SECONDS: f64 = 120e-9;
+const PNG_SECONDS: f64 = 60e-9;
+
+fn fail(plan: &mut Explanation, problem: String) {
+    plan.prospect = Prospect::Fail;
+    plan.problem = Some(format!("{}: {problem}", plan.input));
+}
+
+fn texture(image: &Image) -> TexturePlan {
+    let (channels, bits) = match &image.texels {
+        Texels::Rgba8(_) => (4, 8),
+        Texels::Rgba16(_) => (4, 16),
+        Texels::Few8(few) => (few.kept, 8),
+        Texels::Few16(few) => (few.kept, 16),
+    };
+    let bytes = texel_bytes(&image.texels);
+    TexturePlan { name: image.name.clone(), width: image.width, height: image.height, channels, bits, bytes }
+}
+
+/// What is known when a scene is ready to be traced.
+fn describe_prepared(scene: &Scene, prepared: &Prepared, plan: &mut Explanation) {
+    let (tables, accel, light) = (&prepared.tables, &prepared.accel_report, &prepared.default_light);
+    let some = |text: &String| (!text.is_empty()).then(|| text.clone());
+    plan.accel.used = Some(accel.used.into());
+    (plan.accel.version, plan.accel.isa) = (some(&accel.version), some(&accel.isa));
+    plan.accel_note.clone_from(&accel.note);
+    plan.front_triangles = Some(accel.front_triangles);
+    plan.features = features(scene, prepared).into_iter().map(|(name, has)| (name.into(), has)).collect();
+    if let Some(triangles) = &mut plan.triangles {
+        triangles.traced = tables.triangles.len() as u64;
+    }
+    plan.warnings.extend(prepared.warnings.iter().cloned());
+    plan.losses.extend(prepared.losses.iter().cloned());
+    plan.notes.extend(light.note());
+    plan.default_light = Some(DefaultLight {
+        requested: default_light_name(light.requested).into(),
+        used: light.used,
+        emitted_lm_per_m2: light.emitted.by_lamps,
+        glowing_share: light.emitted.glowing,
+    });
+    let count = |kind: fn(&Light) -> bool| scene.lights.iter().filter(|placed| kind(&placed.light)).count();
+    let environment = tables.lights.has_environment();
+    let sampled = tables.lights.len() - usize::from(environment);
+    // The table leaves out those that do not shine at all.
+    let shining = scene.lights.iter().filter(|placed| shines(&placed.light)).count();
+    plan.lights = Some(LightPlan {
+        emissive_triangles: sampled.saturating_sub(shining) as u64,
+        point: count(|light| matches!(light, Light::Point { .. })),
+        spot: count(|light| matches!(light, Light::Spot { .. })),
+        directional: count(|light| matches!(light, Light::Directional { .. })),
+        environment,
+    });
+}
+
+fn shines(light: &Light) -> bool {
+    let (Light::Point { intensity: c } | Light::Spot { intensity: c, .. } | Light::Directional { illuminance: c }) =
+        light;
+    c.iter().sum::<f32>() > 0.0
+}

@@ -1,0 +1,21 @@
+//! What a scene asks of the renderer, by name: `features` of the JSON, of a render and of a plan alike.
+
+use super::Prepared;
+use crate::scene::Scene;
+
+/// Named yes/no facts about `scene` as it was prepared, in a fixed order.
+pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)> {
+    let tables = &prepared.tables;
+    vec![
+        ("emissive_surfaces", tables.lights.has_triangles()),
+        ("punctual_lights", !scene.lights.is_empty()),
+        ("environment", tables.lights.has_environment()),
+        ("default_light", prepared.default_light.used),
+        ("textures", !scene.textures.is_empty()),
+        ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
+        ("normal_maps", tables.triangles.has_tangents()),
+        ("alpha", tables.materials.has_alpha()),
+        ("unlit", tables.materials.has_unlit()),
+        ("vertex_colors", tables.triangles.has_colors()),
+    ]
+}

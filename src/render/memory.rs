@@ -1,0 +1,225 @@
+//! What a picture takes of memory, known before it is allocated: by part, from the scene and the settings.
+//!
+//! The constants are the sizes of the types they stand for, or measured where they are another library's;
+//! `examples/memory.rs` holds the sum against what a process took at most.
+
+use super::tracer::window;
+use super::{AccelChoice, DefaultLight, RenderSettings};
+use crate::accel::front::MOST;
+use crate::film::BLOCKS;
+use crate::light::{studio, table::PreparedLight};
+use crate::scene::{Instance, Scene};
+use crate::shape::Mesh;
+use crate::texture::Texels;
+use serde::Serialize;
+
+/// Bytes by what they are for. A part that is not known yet is 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct MemoryEstimate {
+    /// The program itself with its libraries and threads.
+    pub program: u64,
+    /// At most while the input is read: its scene and what reading it takes.
+    pub loading: u64,
+    /// What the allocator keeps of that when the input has been read: many small pieces leave holes.
+    pub left_over: u64,
+    /// The scene as described: meshes and decoded images.
+    pub scene: u64,
+    /// What shading and rays read while the picture is traced: triangle records, texels, lights, the BVH.
+    pub prepared: u64,
+    /// Beyond that while it is built.
+    pub building: u64,
+    /// The block sums of every pixel, and their mean.
+    pub film: u64,
+    /// The finished picture and its encoded files: when the film is gone.
+    pub files: u64,
+}
+
+impl MemoryEstimate {
+    /// At most while the picture is made, beyond its scene.
+    pub fn rendering(&self) -> u64 {
+        self.prepared.saturating_add(self.building.max(self.film).max(self.files))
+    }
+
+    /// At most at any time.
+    pub fn peak(&self) -> u64 {
+        let rendering = self.left_over.saturating_add(self.scene).saturating_add(self.rendering());
+        self.program.saturating_add(rendering.max(self.loading))
+    }
+
+    /// Every part by name.
+    pub fn parts(&self) -> [(&'static str, u64); 8] {
+        [
+            ("program", self.program),
+            ("loading", self.loading),
+            ("left over", self.left_over),
+            ("scene", self.scene),
+            ("prepared", self.prepared),
+            ("building", self.building),
+            ("film", self.film),
+            ("files", self.files),
+        ]
+    }
+}
+
+/// Which files are encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Encoded {
+    /// The EXR.
+    pub exr: bool,
+    /// The PNG.
+    pub png: bool,
+}
+
+/// The program; Embree with its TBB, once opened. Measured.
+const PROGRAM: u64 = 6 << 20;
+const EMBREE_LIBRARY: u64 = 7 << 20;
+/// A thread with its paths (`integrator::pool`, about 200 bytes a path) and its stack as far as used.
+const THREAD: u64 = 1 << 20;
+
+/// What a picture takes that depends on its size alone: everything that can be known before the input is read.
+pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
+    let window = window(settings);
+    let pixels = u64::from(window.width).saturating_mul(u64::from(window.height));
+    let threads = settings.threads.unwrap_or_else(rayon::current_num_threads) as u64;
+    // Four f32 a block, and 3 f32 of the mean; a hundredth for what the allocator needs.
+    let film = pixels.saturating_mul(16 * u64::from(BLOCKS.min(settings.spp)) + 12);
+    let film = film.saturating_add(film / 100);
+    let embree =
+        if settings.accel == AccelChoice::Auto || settings.accel == AccelChoice::Embree { EMBREE_LIBRARY } else { 0 };
+    // 3 f32 a pixel; EXR: 4 f32 a pixel; PNG: 3 bytes a pixel and, compressed, no more again.
+    let files = 12 + if files.exr { 16 } else { 0 } + if files.png { 6 } else { 0 };
+    MemoryEstimate {
+        program: PROGRAM + embree + threads * THREAD,
+        film,
+        files: pixels.saturating_mul(files),
+        ..MemoryEstimate::default()
+    }
+}
+
+/// What the picture of `scene` takes, all parts but `loading` and `left_over`. Nothing large is allocated to find out.
+pub fn estimate(scene: &Scene, settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
+    let mut of_picture = of_picture(settings, files);
+    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST {
+        of_picture.program -= EMBREE_LIBRARY;
+    }
+    let Machinery { held, building } = Machinery::of(scene, settings);
+    MemoryEstimate { scene: scene_bytes(scene), prepared: held, building, ..of_picture }
+}
+
+/// What a scene holds, bytes.
+pub fn scene_bytes(scene: &Scene) -> u64 {
+    let meshes: u64 = scene.meshes.iter().map(mesh_bytes).sum();
+    let images: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
+    let names: usize = scene.instances.iter().map(|instance| instance.name.len()).sum();
+    let instances = size_of::<Instance>() * scene.instances.len() + names;
+    let environment = scene.environment.as_ref().map_or(0, |e| size_of_val(&*e.radiance));
+    meshes + images + (instances + environment) as u64
+}
+
+/// What a mesh holds, bytes.
+fn mesh_bytes(mesh: &Mesh) -> u64 {
+    let normals = mesh.normals.as_ref().map_or(0, |n| size_of_val(&**n));
+    let uvs: usize = mesh.uv_sets.iter().map(|set| size_of_val(&**set)).sum();
+    let colors = mesh.colors.as_ref().map_or(0, |c| size_of_val(&**c));
+    let tangents = mesh.tangents.as_ref().map_or(0, |t| size_of_val(&**t));
+    (size_of_val(&*mesh.positions) + normals + uvs + colors + tangents + size_of_val(&*mesh.indices)) as u64
+}
+
+/// What decoded pixels hold, bytes.
+pub fn texel_bytes(texels: &Texels) -> u64 {
+    let bytes = match texels {
+        Texels::Rgba8(texels) => size_of_val(&**texels),
+        Texels::Rgba16(texels) => size_of_val(&**texels),
+        Texels::Few8(few) => size_of_val(&*few.values),
+        Texels::Few16(few) => size_of_val(&*few.values),
+    };
+    bytes as u64
+}
+
+/// What `render::prepare` makes of a scene, bytes.
+struct Machinery {
+    /// As long as the picture is traced.
+    held: u64,
+    /// Beyond that while it is built.
+    building: u64,
+}
+
+/// A triangle's records in `shape::table`.
+const TRIANGLE: u64 = 64;
+/// Its attributes there: normals and coordinates; colours; each further set of coordinates; tangents.
+const ATTRIBUTES: u64 = 64;
+const COLORS: u64 = 48;
+const MORE_UVS: u64 = 32;
+const TANGENTS: u64 = 48;
+/// A light in `light::table`: six records and the end of its share.
+const LIGHT: u64 = 6 * 16 + 4;
+/// A texel of an environment: record and the end of its share.
+const ENVIRONMENT_TEXEL: u64 = 16 + 4;
+
+impl Machinery {
+    fn of(scene: &Scene, settings: &RenderSettings) -> Self {
+        let emits: Vec<bool> =
+            (scene.materials.iter()).map(|m| !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0)).collect();
+        let (mut vertices, mut triangles, mut lights, mut records, mut largest) = (0_u64, 0_u64, 0_u64, 0_u64, 0_u64);
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh.index()];
+            let n = mesh.indices.len() as u64;
+            vertices += mesh.positions.len() as u64;
+            triangles += n;
+            largest = largest.max(mesh.positions.len() as u64);
+            records += n * bytes_per_triangle(mesh);
+            if emits.get(mesh.material.index()) == Some(&true) {
+                lights += n;
+            }
+        }
+        lights += scene.lights.len() as u64;
+        let texels: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
+        let environment = match &scene.environment {
+            Some(own) => own.radiance.len() as u64 * ENVIRONMENT_TEXEL,
+            None if settings.default_light == DefaultLight::Off => 0,
+            None => u64::from(studio::SIZE[0] * studio::SIZE[1]) * ENVIRONMENT_TEXEL,
+        };
+        let geometry = 12 * (vertices + triangles);
+        let accel = accel(vertices, triangles, settings.accel);
+        let list = lights * (size_of::<(PreparedLight, f64)>() as u64 + 8);
+        Self {
+            held: records + texels + environment + lights * LIGHT + accel.held,
+            building: geometry + (12 * largest).max(list) + accel.building,
+        }
+    }
+}
+
+/// What the triangle table holds a triangle of `mesh`.
+fn bytes_per_triangle(mesh: &Mesh) -> u64 {
+    let has_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
+    let more = mesh.uv_sets.len().saturating_sub(1) as u64;
+    TRIANGLE
+        + if has_attributes { ATTRIBUTES + MORE_UVS * more } else { 0 }
+        + if mesh.colors.is_some() { COLORS } else { 0 }
+        + if mesh.tangents.is_some() { TANGENTS } else { 0 }
+}
+
+/// What a backend takes, bytes.
+struct AccelBytes {
+    held: u64,
+    /// Beyond that while it is built.
+    building: u64,
+}
+
+fn accel(vertices: u64, triangles: u64, choice: AccelChoice) -> AccelBytes {
+    let geometry = 12 * (vertices + triangles);
+    match choice {
+        AccelChoice::Linear => AccelBytes { held: geometry, building: 0 },
+        AccelChoice::Bvh => AccelBytes { held: BVH.held * triangles, building: BVH.building * triangles },
+        AccelChoice::Auto | AccelChoice::Embree => {
+            AccelBytes { held: geometry + EMBREE.held * triangles, building: EMBREE.building * triangles }
+        }
+    }
+}
+
+/// Bytes a triangle of `accel::wide`: 40 in leaves and about 45 in nodes; while it is built two binary nodes of 80 and a
+/// reference of 32.
+const BVH: AccelBytes = AccelBytes { held: 85, building: 2 * 80 + 32 };
+/// Bytes a triangle of Embree 4.4 (ROBUST, medium quality): 92 at most, measured on grids and a cave; the arrays that it
+/// reads are counted beside.
+const EMBREE: AccelBytes = AccelBytes { held: 80, building: 16 };
