@@ -291,7 +291,7 @@ fn a_scene_becomes_exr_png_and_json_also_below_spaces_and_unicode() {
         .map(|e| e.unwrap().file_name().into_string().unwrap())
         .collect();
     files.sort();
-    assert_eq!(files, ["batch.json", "été 1.exr", "été 1.json", "été 1.png"]);
+    assert_eq!(files, ["batch.json", "index.html", "été 1.exr", "été 1.json", "été 1.png"]);
     assert!(stderr(&output).contains("16x8  2 spp"), "{}", stderr(&output));
 }
 
