@@ -19,6 +19,7 @@ pub mod memory;
 pub mod names;
 pub mod output;
 pub mod panics;
+mod pattern;
 mod peek;
 mod picture;
 mod render_stage;
