@@ -21,7 +21,7 @@ Examples:
   prt-batch compare renders/a.exr reference/a.exr --max-relmse 1e-3
 
 Exit codes: 0 all rendered or empty; 1 some images failed; 2 usage; 3 every input was bad;
-4 outputs cannot be written.";
+4 outputs cannot be written; 75 interrupted, finished images are kept.";
 
 /// Path-traces glTF scenes on the CPU, in batches, to linear HDR EXR and tone-mapped PNG.
 #[derive(Debug, Parser)]
