@@ -45,7 +45,6 @@ fn kill(moments: u64) {
     for i in 0..SCENES {
         // Emission differs, so that no picture can stand for another.
         let scene = SCENE.replacen("0.25", &format!("0.{}5", 1 + i), 1);
-        assert_ne!(scene, SCENE.replacen("0.25", "0.95", 1));
         fs::write(root.path().join(format!("scenes/s{i}.gltf")), scene).unwrap();
     }
     let clock = Instant::now();
