@@ -1,6 +1,8 @@
 //! From what the user typed to the files to render.
 
+use super::pattern::{self, PatternError, is_pattern};
 use crate::error::{LoadError, SourceLoc};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Extensions of scene files, lower case. The first of two files that differ only in it keeps the plain output name.
@@ -17,8 +19,9 @@ pub struct Input {
     pub problem: Option<LoadError>,
 }
 
-/// The files that `paths` mean: a folder means every scene file below it, in the order of their paths. A file that two
-/// of `paths` mean with the same output folder is taken once.
+/// The files that `paths` mean: a folder means every scene file below it, in the order of their paths, and what is not
+/// there and has `*`, `?` or `[` in it means the scene files that it matches. A file that two of `paths` mean with the
+/// same output folder is taken once.
 pub fn expand(paths: &[PathBuf]) -> Vec<Input> {
     let mut inputs = Vec::new();
     for path in paths {
@@ -36,15 +39,14 @@ pub fn expand(paths: &[PathBuf]) -> Vec<Input> {
 
 fn expand_one(path: &Path, inputs: &mut Vec<Input>) -> Result<(), LoadError> {
     let at = || SourceLoc::file(path);
-    let metadata = std::fs::metadata(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound if is_pattern(path) => LoadError::new(
-            at(),
-            "no file matches this pattern",
-            "The shell passes a pattern as it stands when nothing matches it. Is the folder right?",
-        ),
-        std::io::ErrorKind::NotFound => LoadError::new(at(), "there is no such file or folder", ""),
-        _ => LoadError::new(at(), format!("cannot be opened: {error}"), ""),
-    })?;
+    let metadata = match std::fs::metadata(path) {
+        Ok(metadata) => metadata,
+        Err(error) if error.kind() == ErrorKind::NotFound && is_pattern(path) => return expand_pattern(path, inputs),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            return Err(LoadError::new(at(), "there is no such file or folder", ""));
+        }
+        Err(error) => return Err(LoadError::new(at(), format!("cannot be opened: {error}"), "")),
+    };
     if !metadata.is_dir() {
         inputs.push(Input { path: path.to_owned(), folder: PathBuf::new(), problem: None });
         return Ok(());
@@ -59,8 +61,21 @@ fn expand_one(path: &Path, inputs: &mut Vec<Input>) -> Result<(), LoadError> {
     Ok(())
 }
 
-fn is_pattern(path: &Path) -> bool {
-    path.to_string_lossy().contains(['*', '?', '['])
+fn expand_pattern(path: &Path, inputs: &mut Vec<Input>) -> Result<(), LoadError> {
+    const ALLOWED: &str = "* and ? stand for what is within a name, ** for any folders, [abc] for one of these; \
+                           only .gltf, .glb and .obj files are taken.";
+    let at = || SourceLoc::file(path);
+    let found = pattern::expand(path).map_err(|error| match error {
+        PatternError::Invalid(error) => LoadError::new(at(), format!("this is no pattern: {}", error.msg), ALLOWED),
+        PatternError::Unreadable(folder, error) => {
+            LoadError::new(SourceLoc::file(&folder), format!("the folder cannot be read: {error}"), "")
+        }
+    })?;
+    if found.is_empty() {
+        return Err(LoadError::new(at(), "no file matches this pattern", format!("Is the folder right? {ALLOWED}")));
+    }
+    inputs.extend(found.into_iter().map(|path| Input { path, folder: PathBuf::new(), problem: None }));
+    Ok(())
 }
 
 /// Adds every scene file below `root/folder`, files before sub-folders, each sorted by name. Links to folders are not

@@ -1,30 +1,20 @@
 //! Values of options: what is allowed, and what is of the contract but not built.
 
+use crate::generate::Product;
+use crate::words::Words;
+use clap::builder::{PossibleValue, TypedValueParser};
 use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
+use std::ffi::OsStr;
 use std::str::FromStr;
 
 /// Most pixels along one side.
 const MAX_SIDE: u32 = prt::batch::MAX_SIDE;
 /// Most samples per pixel: 2^20, where the sampler's sequences end.
 const MAX_SPP: u32 = 1 << 20;
-
-/// One of `built`; those of `unbuilt` are refused by name.
-fn word<T: Copy>(value: &str, built: &[(&str, T)], unbuilt: &[&str]) -> Result<T, String> {
-    if let Some(&(_, found)) = built.iter().find(|(name, _)| *name == value) {
-        return Ok(found);
-    }
-    let names: Vec<_> = built.iter().map(|(name, _)| *name).collect();
-    let names = names.join(", ");
-    if unbuilt.contains(&value) {
-        Err(format!("{value} is not built yet; built: {names}"))
-    } else {
-        Err(format!("allowed: {names}"))
-    }
-}
 
 /// A whole number from `least` to `most`.
 fn number<T: FromStr + PartialOrd + std::fmt::Display>(value: &str, least: T, most: T) -> Result<T, String> {
@@ -34,10 +24,13 @@ fn number<T: FromStr + PartialOrd + std::fmt::Display>(value: &str, least: T, mo
 
 pub fn size(value: &str) -> Result<(u32, u32), String> {
     let side = |text: &str| number(text, 1, MAX_SIDE).ok();
-    value
-        .split_once('x')
-        .and_then(|(width, height)| Some((side(width)?, side(height)?)))
-        .ok_or_else(|| format!("must be WIDTHxHEIGHT, such as 1280x720, each from 1 to {MAX_SIDE}"))
+    let sides = |value: &str, x: char| value.split_once(x).and_then(|(w, h)| Some((side(w.trim())?, side(h.trim())?)));
+    sides(value, 'x').filter(|_| !value.contains(' ')).ok_or_else(|| {
+        let meant = ['x', 'X', '*', ',', ':', '\u{d7}'].iter().find_map(|x| sides(value, *x));
+        let meant = meant.map(|(width, height)| format!("; did you mean {width}x{height}?"));
+        let allowed = format!("must be WIDTHxHEIGHT, such as 1280x720, each from 1 to {MAX_SIDE}");
+        allowed + &meant.unwrap_or_default()
+    })
 }
 
 pub fn width(value: &str) -> Result<u32, String> {
@@ -98,7 +91,9 @@ pub fn threads(value: &str) -> Result<usize, String> {
     number(value, 1, 4096)
 }
 
-pub fn filter(value: &str) -> Result<Filter, String> {
+const FILTERS: Words<bool> = Words::new(&[("box", true), ("tent", false)], &["gaussian", "blackman-harris"]);
+
+fn filter(value: &str) -> Result<Filter, String> {
     const MAX_WIDTH: f32 = 64.0;
     let (name, width) = value.split_once(':').map_or((value, None), |(name, width)| (name, Some(width)));
     let width = |default: f32| {
@@ -108,28 +103,44 @@ pub fn filter(value: &str) -> Result<Filter, String> {
         };
         width.map_or(Ok(default), parse)
     };
-    match word(name, &[("box", true), ("tent", false)], &["gaussian", "blackman-harris"])? {
+    match FILTERS.find(name)? {
         true => Ok(Filter::Box { width: width(1.0)? }),
         false => Ok(Filter::Tent { width: width(2.0)? }),
     }
 }
 
-pub fn accel(value: &str) -> Result<AccelChoice, String> {
+/// The word of a pixel filter, with or without a width behind it.
+#[derive(Clone)]
+pub struct FilterParser;
+
+impl TypedValueParser for FilterParser {
+    type Value = Filter;
+
+    fn parse_ref(&self, cmd: &clap::Command, arg: Option<&clap::Arg>, value: &OsStr) -> Result<Filter, clap::Error> {
+        filter.parse_ref(cmd, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(FILTERS.possible_values().into_iter()))
+    }
+}
+
+pub fn accel() -> Words<AccelChoice> {
     use AccelChoice::{Auto, Bvh, Embree, Linear};
-    word(value, &[("auto", Auto), ("embree", Embree), ("bvh", Bvh), ("linear", Linear)], &[])
+    Words::new(&[("auto", Auto), ("embree", Embree), ("bvh", Bvh), ("linear", Linear)], &[])
 }
 
-pub fn default_light(value: &str) -> Result<DefaultLight, String> {
+pub fn default_light() -> Words<DefaultLight> {
     use DefaultLight::{Auto, Off, On};
-    word(value, &[("auto", Auto), ("on", On), ("off", Off)], &[])
+    Words::new(&[("auto", Auto), ("on", On), ("off", Off)], &[])
 }
 
-pub fn brdf(value: &str) -> Result<Brdf, String> {
-    word(value, &[("appendix-b", Brdf::AppendixB)], &["full"])
+pub fn brdf() -> Words<Brdf> {
+    Words::new(&[("appendix-b", Brdf::AppendixB)], &["full"])
 }
 
-pub fn integrator(value: &str) -> Result<&'static str, String> {
-    word(value, &[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
+pub fn integrator() -> Words<&'static str> {
+    Words::new(&[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
 }
 
 pub fn exposure(value: &str) -> Result<Exposure, String> {
@@ -141,17 +152,17 @@ pub fn exposure(value: &str) -> Result<Exposure, String> {
     stops.ok_or_else(|| "must be auto or a number of stops from -100 to 100".into())
 }
 
-pub fn tonemap(value: &str) -> Result<ToneCurve, String> {
-    word(value, &ToneCurve::NAMES, &[])
+pub fn tonemap() -> Words<ToneCurve> {
+    Words::new(&ToneCurve::NAMES, &[])
 }
 
-pub fn exr(value: &str) -> Result<ExrSamples, String> {
-    word(value, &[("float", ExrSamples::Float), ("half", ExrSamples::Half)], &[])
+pub fn exr() -> Words<ExrSamples> {
+    Words::new(&[("float", ExrSamples::Float), ("half", ExrSamples::Half)], &[])
 }
 
-pub fn exr_compression(value: &str) -> Result<ExrCompression, String> {
+pub fn exr_compression() -> Words<ExrCompression> {
     use ExrCompression::{None, Piz, Rle, Zip, Zips};
-    word(value, &[("zip", Zip), ("zips", Zips), ("piz", Piz), ("rle", Rle), ("none", None)], &[])
+    Words::new(&[("zip", Zip), ("zips", Zips), ("piz", Piz), ("rle", Rle), ("none", None)], &[])
 }
 
 /// How progress is shown.
@@ -163,17 +174,17 @@ pub enum ProgressStyle {
     None,
 }
 
-pub fn progress(value: &str) -> Result<ProgressStyle, String> {
+pub fn progress() -> Words<ProgressStyle> {
     use ProgressStyle::{Auto, Json, None, Plain};
-    word(value, &[("auto", Auto), ("plain", Plain), ("json", Json), ("none", None)], &[])
+    Words::new(&[("auto", Auto), ("plain", Plain), ("json", Json), ("none", None)], &[])
 }
 
 pub fn name(value: &str) -> Result<NameTemplate, String> {
     NameTemplate::parse(value)
 }
 
-pub fn obj_up(value: &str) -> Result<ObjUp, String> {
-    word(value, &[("y", ObjUp::Y), ("z", ObjUp::Z)], &[])
+pub fn obj_up() -> Words<ObjUp> {
+    Words::new(&[("y", ObjUp::Y), ("z", ObjUp::Z)], &[])
 }
 
 pub fn obj_scale(value: &str) -> Result<f64, String> {
@@ -190,4 +201,8 @@ pub fn smooth_angle(value: &str) -> Result<f32, String> {
 pub fn limit(value: &str) -> Result<f64, String> {
     let inside = |n: &f64| n.is_finite() && *n >= 0.0;
     value.parse().ok().filter(inside).ok_or_else(|| "must be a number, 0 or more".into())
+}
+
+pub fn generate() -> Words<Product> {
+    Words::new(Product::NAMES, &[])
 }

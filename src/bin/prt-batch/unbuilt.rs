@@ -1,32 +1,90 @@
-//! Options and commands of the contract that are not built: refused by name, never ignored, never "unknown option".
+//! Options and commands of the contract that are not built: refused by name, never ignored, never "unknown option", and
+//! not in the help; only the table of `docs/cli.md` has them.
 
 use clap::{Arg, ArgAction, ArgMatches, Command};
 
-/// Options of `render`, and whether a value follows.
-const OPTIONS: &[(&str, bool)] = &[
-    ("frames", true),
-    ("fps", true),
-    ("animation", true),
-    ("shutter", true),
-    ("shutter-position", true),
-    ("target-error", true),
-    ("time-limit", true),
-    ("batch-time-limit", true),
-    ("clamp", true),
-    ("env", true),
-    ("env-rotate", true),
-    ("env-scale", true),
-    ("f-stop", true),
-    ("focus-distance", true),
-    ("focus-on", true),
-    ("aperture-blades", true),
-    ("sensor", true),
-    ("aov", true),
-    ("transparent", false),
-    ("texture-lod", false),
-    ("config", true),
-    ("strict", false),
-    ("display", true),
+/// An option of `render`.
+struct Unbuilt {
+    /// Its long name.
+    name: &'static str,
+    /// What its value is called; empty for one without.
+    value: &'static str,
+    heading: &'static str,
+    /// As in the doc comments of `args`: the default in brackets at the end.
+    meaning: &'static str,
+}
+
+const fn option(heading: &'static str, name: &'static str, value: &'static str, meaning: &'static str) -> Unbuilt {
+    Unbuilt { name, value, heading, meaning }
+}
+
+const OPTIONS: &[Unbuilt] = &[
+    option(
+        "Sampling",
+        "target-error",
+        "E",
+        "Stop when the upper end of the 95 % interval of the estimated relative error (sqrt of relMSE, below) is <= E; \
+         with it or a time limit --spp is the most, by itself 2^20 [default: off]",
+    ),
+    option(
+        "Sampling",
+        "time-limit",
+        "30s",
+        "Stop an image's sampling; ends only at wave boundaries, and the JSON says the spp reached, with which the bytes \
+         can be repeated [default: off]",
+    ),
+    option("Sampling", "batch-time-limit", "8h", "Share a whole batch's time [default: off]"),
+    option(
+        "Sampling",
+        "clamp",
+        "C",
+        "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
+    ),
+    option("Sampling", "texture-lod", "", "Ray-cone level of detail (biased)"),
+    option(
+        "Light",
+        "env",
+        "FILE.hdr|.exr",
+        "Equirectangular environment; with it --default-light auto is off [default: none]",
+    ),
+    option("Light", "env-rotate", "DEG", "Its rotation, counter-clockwise about +Y seen from above [default: 0]"),
+    option("Light", "env-scale", "S", "Factor on its radiance [default: 1]"),
+    option(
+        "Lens",
+        "f-stop",
+        "N",
+        "Thin lens of radius f/(2N) in metres, f = (sensor_h/2)/tan(yfov/2); with an orthographic camera an error \
+         [default: from the file, else pinhole]",
+    ),
+    option("Lens", "focus-distance", "M", "Metres along the axis [default: from the file]"),
+    option("Lens", "focus-on", "NODE", "Focus on a node in place of a distance"),
+    option("Lens", "aperture-blades", "N", "Corners of the aperture [default: from the file, else round]"),
+    option("Lens", "sensor", "MM", "The longer side of the image [default: from the file, else 36]"),
+    option(
+        "Files",
+        "aov",
+        "LIST",
+        "EXR layers out of albedo,normal,depth,position,uv,object-id,material-id,cryptomatte,\
+         variance,samples [default: none]",
+    ),
+    option("Files", "transparent", "", "Alpha from coverage; background not in the beauty [default: off: alpha 1]"),
+    option(
+        "Animation",
+        "frames",
+        "all|1-24|1-100x2|1,5,9",
+        "Frame f is at t = f/fps; channels clamp outside their keys; all = 0..ceil(duration x fps) [default: the file as \
+         written, no animation]",
+    ),
+    option("Animation", "fps", "N", "Frames a second [default: 24]"),
+    option("Animation", "animation", "INDEX|NAME|all", "Which animation [default: 0]"),
+    option(
+        "Animation",
+        "shutter",
+        "FRACTION",
+        "Share of a frame that the shutter is open [default: from the file, else 0]",
+    ),
+    option("Animation", "shutter-position", "start|center|end", "Where the open shutter lies [default: center]"),
+    option("Terminal", "display", "HOST:PORT", "Show pictures as they grow in tev"),
 ];
 
 /// Commands.
@@ -51,15 +109,21 @@ fn negatives(command: Command) -> Command {
     })
 }
 
-fn with_options(command: Command) -> Command {
-    negatives(command).args(OPTIONS.iter().map(|&(name, takes_value)| {
-        let arg = Arg::new(name).long(name).hide(true);
-        if takes_value {
-            arg.num_args(0..=1).allow_hyphen_values(true).action(ArgAction::Append)
-        } else {
+/// `render`'s options with those that are not built.
+pub fn with_options(command: Command) -> Command {
+    negatives(command).args(OPTIONS.iter().map(|option| {
+        let arg = Arg::new(option.name).long(option.name).hide(true).help(option.meaning).help_heading(option.heading);
+        if option.value.is_empty() {
             arg.action(ArgAction::SetTrue)
+        } else {
+            arg.value_name(option.value).num_args(0..=1).allow_hyphen_values(true).action(ArgAction::Append)
         }
     }))
+}
+
+/// Whether `--name` is an option of `render` that is not built.
+pub fn is_unbuilt(name: &str) -> bool {
+    OPTIONS.iter().any(|option| option.name == name)
 }
 
 /// The first thing on the command line that is not built.
@@ -68,9 +132,13 @@ pub fn asked_for(matches: &ArgMatches) -> Option<String> {
         matches.try_contains_id(name).is_ok()
             && matches.value_source(name) == Some(clap::parser::ValueSource::CommandLine)
     };
+    let option = |matches: &ArgMatches| {
+        let found = OPTIONS.iter().find(|option| used(matches, option.name));
+        found.map(|option| format!("--{}", option.name))
+    };
     match matches.subcommand() {
         Some((name, _)) if COMMANDS.contains(&name) => Some(name.to_owned()),
-        Some((_, inner)) => OPTIONS.iter().find(|(name, _)| used(inner, name)).map(|(name, _)| format!("--{name}")),
-        None => OPTIONS.iter().find(|(name, _)| used(matches, name)).map(|(name, _)| format!("--{name}")),
+        Some((_, inner)) => option(inner),
+        None => option(matches),
     }
 }

@@ -1,7 +1,7 @@
 //! `prt-batch doctor`: what was found on this machine. Exit code 0, or 1 if something does not work.
 
-use super::render::embree_dirs;
 use crate::args::DoctorArgs;
+use crate::meaning::embree_dirs;
 use crate::term;
 use prt::batch::doctor::{Doctor, doctor};
 use prt::batch::memory::amount;

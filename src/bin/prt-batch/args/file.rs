@@ -1,0 +1,173 @@
+//! Options that may differ from file to file; a config file may have them in `[[file]]` blocks too.
+//!
+//! What needs another option (`--eye` and `--look-at`) is checked in `meaning.rs`, when config files and the command
+//! line have come together.
+
+use crate::parse;
+use clap::{Args, ValueHint};
+use prt::batch::{job::CameraChoice, names::NameTemplate};
+use prt::color::{Exposure, ToneCurve};
+use prt::image::exr::{ExrCompression, ExrSamples};
+use prt::load::obj::ObjUp;
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
+use std::path::PathBuf;
+
+const PICTURES: &str = "Pictures";
+const CAMERAS: &str = "Cameras";
+const SAMPLING: &str = "Sampling";
+const LIGHT: &str = "Light";
+const FILES: &str = "Files";
+const OBJ: &str = "OBJ";
+
+#[derive(Args, Debug)]
+pub struct FileArgs {
+    /// Pixels, such as 1280x720
+    ///
+    /// Each side at most 65536.
+    #[arg(long, value_name = "WxH", value_parser = parse::size, allow_hyphen_values = true, help_heading = PICTURES)]
+    #[arg(conflicts_with = "width")]
+    pub size: Option<(u32, u32)>,
+    /// Pixels across; the height follows from the camera's aspect ratio, else 16:9 [default: 1280]
+    #[arg(long, value_name = "W", value_parser = parse::width, help_heading = PICTURES)]
+    pub width: Option<u32>,
+    /// Render that window only
+    ///
+    /// Origin top left, y down (EXR data window; the display window stays whole). Its pixels equal those of the whole
+    /// picture.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, allow_hyphen_values = true, help_heading = PICTURES)]
+    pub crop: Option<CropWindow>,
+    /// Exposure of the PNG in stops, or auto
+    ///
+    /// From -100 to 100; the EXR is never touched by it. auto and the curves: see "The PNG" below.
+    #[arg(long, value_name = "EV", default_value = "0", value_parser = parse::exposure, allow_hyphen_values = true)]
+    #[arg(help_heading = PICTURES)]
+    pub exposure: Exposure,
+    /// Tone curve of the PNG
+    ///
+    /// The EXR is never touched by it.
+    #[arg(long, value_name = "CURVE", default_value = "neutral", value_parser = parse::tonemap(), help_heading = PICTURES)]
+    pub tonemap: ToneCurve,
+    /// Single-sided surfaces are invisible to camera rays from behind
+    #[arg(long, help_heading = PICTURES)]
+    pub cull_backfaces: bool,
+
+    /// Which scene: an index or a name [default: the file's]
+    #[arg(long, value_name = "SCENE", help_heading = CAMERAS)]
+    pub scene: Option<String>,
+    /// Which cameras: all, an index or a name
+    ///
+    /// Of the default scene, or of that of --scene. A number is a place in the scene (depth first), anything else a
+    /// name; of several of one name the first. A file without cameras is seen by one framed on its bounds.
+    #[arg(long, value_name = "CAMERA", default_value = "all", value_parser = parse::camera, help_heading = CAMERAS)]
+    pub camera: CameraChoice,
+    /// Cameras of this glTF file's default scene, for every input and in place of its own
+    ///
+    /// All of them, or the one that --camera names; nothing else of the file is read. A camera that is not to be had
+    /// is a usage error (2).
+    #[arg(long, value_name = "FILE.gltf", help_heading = CAMERAS, value_hint = ValueHint::FilePath)]
+    pub camera_from: Option<PathBuf>,
+    /// A camera at this place, for every input and in place of its own; needs --look-at
+    ///
+    /// Metres. The camera is called eye and has no aspect ratio of its own. Excludes --camera and --camera-from, as do
+    /// --look-at, --up and --yfov.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true, help_heading = CAMERAS)]
+    #[arg(conflicts_with_all = ["camera_from", "camera"])]
+    pub eye: Option<[f64; 3]>,
+    /// The point in the middle of the picture from --eye, metres
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true, help_heading = CAMERAS)]
+    #[arg(conflicts_with_all = ["camera_from", "camera"])]
+    pub look_at: Option<[f64; 3]>,
+    /// What points up in the picture from --eye [default: 0,1,0]
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::vector, allow_hyphen_values = true, help_heading = CAMERAS)]
+    #[arg(conflicts_with_all = ["camera_from", "camera"])]
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view from --eye, degrees [default: 40]
+    #[arg(long, value_name = "DEG", value_parser = parse::yfov, help_heading = CAMERAS)]
+    #[arg(conflicts_with_all = ["camera_from", "camera"])]
+    pub yfov: Option<f64>,
+
+    /// Samples per pixel
+    ///
+    /// From 1 to 2^20.
+    #[arg(short, long, value_name = "N", default_value = "64", value_parser = parse::spp, help_heading = SAMPLING)]
+    pub spp: u32,
+    /// Same seed, same pixels
+    #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
+    pub seed: u64,
+    /// What is computed
+    #[arg(long, value_name = "NAME", default_value = "path", value_parser = parse::integrator(), help_heading = SAMPLING)]
+    pub integrator: &'static str,
+    /// Scatterings after the first; 0 = emitted and direct light only [default: unlimited]
+    ///
+    /// Roulette ends paths; a safety cap of 1024, which is also the most that may be given. The share of paths cut
+    /// goes to JSON and EXR (prt:truncated).
+    #[arg(long, value_name = "N", value_parser = parse::max_bounces, help_heading = SAMPLING)]
+    pub max_bounces: Option<u32>,
+    /// Microfacet model
+    ///
+    /// appendix-b: the single-scattering formulas of glTF 2.0 appendix B with height-correlated G, for comparison with
+    /// other renderers. full: energy-compensated, conserving; it will be the default when it is built.
+    #[arg(long, value_name = "MODEL", default_value = "appendix-b", value_parser = parse::brdf(), help_heading = SAMPLING)]
+    pub brdf: Brdf,
+    /// Pixel filter: box or tent, :WIDTH = full support in pixels
+    ///
+    /// Sampled by importance. tent:2 is smallpt's; box is :1.
+    #[arg(long, value_name = "NAME[:WIDTH]", default_value = "tent:2", help_heading = SAMPLING)]
+    #[arg(value_parser = parse::FilterParser, hide_possible_values = true)]
+    pub filter: Filter,
+    /// Ray backend
+    ///
+    /// auto: Embree if its library is found, else bvh, and it says which. linear: brute force, for tests.
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = parse::accel(), help_heading = SAMPLING)]
+    pub accel: AccelChoice,
+
+    /// Built-in studio light
+    ///
+    /// auto: on when the file has no punctual and no image-based light, what of it emits more than 1 nit gives less
+    /// than 0.02 lm per m^2 of all its surface, and less than half of its surface emits; figures and choice are logged
+    /// and recorded. Of a scene that has an environment of its own, that one is used.
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light(), help_heading = LIGHT)]
+    pub default_light: DefaultLight,
+
+    /// Output name from {stem} {parent} {camera} [default: {stem}, with .{camera} if a file has several]
+    ///
+    /// "/" in it makes sub-folders. {camera} is the camera's name made fit for a file (else its index), 0 for the one
+    /// framed on the bounds. Without --name the same stem of another type in one folder adds its extension
+    /// (cornell.obj.exr): of a.gltf, a.glb and a.obj the first that is there keeps the plain name. {frame} is not
+    /// built; .{frame:04} will be added when there are several frames.
+    #[arg(long, value_name = "TEMPLATE", value_parser = parse::name, help_heading = FILES)]
+    pub name: Option<NameTemplate>,
+    /// Sample type of the EXR
+    ///
+    /// half clips at 65504 and the clipped pixels are counted.
+    #[arg(long, value_name = "TYPE", default_value = "float", value_parser = parse::exr(), help_heading = FILES)]
+    pub exr: ExrSamples,
+    /// Compression of the EXR; all are lossless
+    #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression(), help_heading = FILES)]
+    pub exr_compression: ExrCompression,
+    /// Write no PNG
+    #[arg(long, help_heading = FILES)]
+    pub no_png: bool,
+    /// Write no EXR
+    #[arg(long, help_heading = FILES)]
+    pub no_exr: bool,
+    /// Files may be read below this folder [default: the input's folder]
+    ///
+    /// Instead of only below the input's own; the refusal of ../textures/x.png names this option.
+    #[arg(long, value_name = "DIR", help_heading = FILES, value_hint = ValueHint::DirPath)]
+    pub asset_root: Option<PathBuf>,
+
+    /// Which axis of the OBJ points up
+    #[arg(long, value_name = "AXIS", default_value = "y", value_parser = parse::obj_up(), help_heading = OBJ)]
+    pub obj_up: ObjUp,
+    /// Metres per unit of the OBJ [default: 1]
+    ///
+    /// From 1e-9 to 1e9.
+    #[arg(long, value_name = "S", value_parser = parse::obj_scale, allow_hyphen_values = true, help_heading = OBJ)]
+    pub obj_scale: Option<f64>,
+    /// Edges of the OBJ below this angle are smooth [default: smoothing groups]
+    ///
+    /// Where the file gives no normals, in place of its smoothing groups. From 0 to 180 degrees.
+    #[arg(long, value_name = "DEG", value_parser = parse::smooth_angle, allow_hyphen_values = true, help_heading = OBJ)]
+    pub smooth_angle: Option<f32>,
+}
