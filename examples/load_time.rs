@@ -1,7 +1,7 @@
 //! `load_time FILE`: how long a file takes to become a scene, and how much memory that takes at most (where the system
 //! tells); `scripts/make_big.py` makes files for it.
 
-use prt::load::{LoadOptions, load};
+use prt::load::{LoadOptions, estimate, load};
 use std::time::Instant;
 
 /// A field of `/proc/self/status` in MiB.
@@ -14,13 +14,17 @@ fn memory(field: &str) -> Option<f64> {
 fn main() {
     for file in std::env::args().skip(1) {
         let start = Instant::now();
+        let estimated = estimate(file.as_ref(), &LoadOptions::default()).map(|e| e.bytes as f64 / f64::from(1 << 20));
+        let looking = start.elapsed().as_secs_f64();
+        let start = Instant::now();
         match load(file.as_ref(), &LoadOptions::default()) {
             Err(error) => println!("error: {error}"),
             Ok((scene, _)) => {
                 let seconds = start.elapsed().as_secs_f64();
                 let (kept, peak) = (memory("VmRSS:"), memory("VmHWM:"));
                 println!(
-                    "{file}: {} triangles, {seconds:.3} s, kept {kept:?} MiB, peak {peak:?} MiB",
+                    "{file}: {} triangles, {seconds:.3} s, kept {kept:?} MiB, peak {peak:?} MiB, \
+                     estimated in {looking:.6} s: {estimated:.1?} MiB",
                     scene.triangle_count()
                 );
             }

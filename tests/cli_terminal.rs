@@ -165,6 +165,7 @@ fn bars_appear_and_vanish_and_no_line_is_torn() {
             assert!(lines[8 + i].starts_with("rendered  ") && lines[8 + i].contains(&name), "{lines:#?}");
         }
         assert!(lines[7].starts_with("status    image  "), "{lines:#?}");
+        assert!(lines[7].contains("warnings") == (columns == 120), "what is known of none makes room: {lines:#?}");
         assert!(lines[14].starts_with("6 rendered, ") && lines.len() == 15, "{lines:#?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Estimates of memory: of reading against what comes of it, of rendering against what a process takes.
 
 use prt::load::{LoadOptions, estimate, load};
-use prt::render::memory::scene_bytes;
+use prt::render::memory::{MemoryEstimate, scene_bytes};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,6 +58,27 @@ fn a_file_that_the_loader_refuses_has_no_estimate_and_pictures_count_by_their_he
     // The loader refuses these: the bytes are not there.
     assert_eq!(of(&png(4, 4), 1_000_000_000), None);
     assert_eq!(of(&png(4, 4), u64::MAX), None);
+}
+
+#[test]
+fn the_parts_at_the_peak_add_up_to_it() {
+    let all = MemoryEstimate {
+        program: 1,
+        loading: 100,
+        left_over: 2,
+        scene: 4,
+        prepared: 8,
+        building: 16,
+        film: 32,
+        files: 20,
+    };
+    let sum = |e: &MemoryEstimate| e.at_peak().iter().map(|(_, bytes)| bytes).sum::<u64>();
+    assert_eq!((all.peak(), sum(&all)), (101, 101));
+    let rendering = MemoryEstimate { loading: 0, ..all };
+    assert_eq!((rendering.peak(), sum(&rendering)), (47, 47));
+    let building = MemoryEstimate { building: 64, ..rendering };
+    assert_eq!((building.peak(), sum(&building)), (79, 79));
+    assert_eq!(MemoryEstimate { film: u64::MAX, ..all }.peak(), u64::MAX);
 }
 
 /// What the program says a picture will take, and what the process that rendered it took.

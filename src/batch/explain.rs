@@ -3,12 +3,13 @@
 
 use super::content::HashCache;
 use super::describe::{accel_name, default_light_name};
+use super::elsewhere::{Elsewhere, cameras_from_elsewhere};
 use super::fingerprint::{CameraOrigin, Wanted};
 use super::job::{Plan, plan};
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
 use super::report::{Accel, DefaultLight, Outputs};
-use super::run::{Stop, cameras_from_elsewhere, names_of, reported_name};
+use super::run::{Stop, names_of, reported_name};
 use super::settings::{BatchSettings, FileSettings, Task};
 use super::size::{PictureSize, aspect_note, check_crop, size_for};
 use super::up_to_date::check;
@@ -199,12 +200,12 @@ pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> R
             check_crop(crop, width, height).map_err(Stop::Usage)?;
         }
     }
-    let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
+    let names: Vec<_> = elsewhere.iter().map(Elsewhere::names).collect();
     let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
     let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
-    for (task, (cameras, origin)) in elsewhere.iter().enumerate() {
+    for (task, Elsewhere { cameras, origin }) in elsewhere.iter().enumerate() {
         let elsewhere = cameras.as_ref();
         let one = File { run: settings, plan: &plan, task, elsewhere, origin, hashes: &hashes, budget };
         let mut count = |explanation: Explanation| {
@@ -423,7 +424,7 @@ impl File<'_> {
 
 /// Wall seconds a pixel that encoding and writing take, measured on one core of a server of 2023 (ZIP; noise compresses
 /// worst).
-const EXR_SECONDS: f64 = 120e-9;
+const EXR_SECONDS: f64 = 200e-9;
 const PNG_SECONDS: f64 = 60e-9;
 
 fn fail(plan: &mut Explanation, problem: String) {

@@ -26,7 +26,7 @@ pub(super) struct LoadStage {
 /// What is to be done for a file.
 pub(super) enum Contents {
     /// Nothing: all of its images are up to date. Each with its id and its progress.
-    Kept(Vec<(ImageId, Arc<Progress>, Box<ImageReport>)>),
+    Kept(Vec<(ImageId, Arc<Progress>, ImageReport)>),
     /// To render it.
     Scene(Box<SceneFile>),
 }
@@ -121,7 +121,7 @@ impl LoadStage {
         let contents = reading.and_then(|reading| {
             let load = || load(&input.path, &settings.load).map_err(|error| error.to_string());
             let (mut scene, times) = shared.beside.install(|| guarded(load))?;
-            if let Some(cameras) = &shared.elsewhere[task].0 {
+            if let Some(cameras) = &shared.elsewhere[task].cameras {
                 settings.camera_source.replace(&mut scene, cameras);
             }
             let names = names_of(&scene.cameras);
@@ -151,7 +151,7 @@ impl LoadStage {
     }
 
     /// The reports of all images of the task if all are up to date; else why not, empty if that needs no saying.
-    fn kept(&self, task: usize, cameras: &[usize], outputs: &[PathBuf]) -> Result<Vec<Box<ImageReport>>, String> {
+    fn kept(&self, task: usize, cameras: &[usize], outputs: &[PathBuf]) -> Result<Vec<ImageReport>, String> {
         if self.shared.settings.force || self.shared.settings.tasks[task].input.problem.is_some() {
             return Err(String::new());
         }

@@ -92,7 +92,7 @@ impl MemoryBudget {
         if peak <= self.bytes {
             return Ok(());
         }
-        let mut parts: Vec<(&str, u64)> = need.parts().into_iter().filter(|(_, b)| *b >= peak / 100).collect();
+        let mut parts: Vec<(&str, u64)> = need.at_peak().into_iter().filter(|(_, b)| *b >= peak / 100).collect();
         parts.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
         let parts: Vec<_> = parts.iter().map(|(name, bytes)| format!("{name} {}", amount(*bytes))).collect();
         let (needs, allowed) = (amount(peak), amount(self.bytes));
@@ -102,7 +102,7 @@ impl MemoryBudget {
             }
             _ => format!("--memory {allowed}"),
         };
-        let picture = need.film.saturating_add(need.files);
+        let picture = need.film.max(need.files);
         let fix = match pixels {
             Some((width, height)) if picture >= peak / 2 => format!(
                 "Most of it is the picture of {width} x {height} pixels: render it in parts with --crop X,Y,W,H, or \
@@ -225,7 +225,7 @@ mod tests {
         for (width, height) in [(40_000, 25_000), (65_536, 65_536)] {
             let settings = RenderSettings { width, height, threads: Some(2), ..RenderSettings::default() };
             let why = budget.check(&of_picture(&settings, files), Some((width, height))).unwrap_err();
-            for part in ["film ", "files ", "--memory, 19.2 GiB (80 % of 24.0 GiB)", "--crop X,Y,W,H", "--size"] {
+            for part in ["(film ", "--memory, 19.2 GiB (80 % of 24.0 GiB)", "--crop X,Y,W,H", "--size"] {
                 assert!(why.contains(part), "{why}");
             }
             assert!(why.contains(&format!("{width} x {height}")), "{why}");

@@ -8,6 +8,7 @@ pub mod content;
 mod describe;
 mod develop;
 pub mod doctor;
+mod elsewhere;
 pub mod explain;
 pub mod fingerprint;
 pub mod host;

@@ -64,6 +64,7 @@ impl RenderStage {
             Ok(Contents::Scene(file)) => *file,
             Ok(Contents::Kept(images)) => {
                 for (id, progress, image) in images {
+                    let image = Box::new(image);
                     self.hand_on(
                         Made { task, id, progress, image, output: None, picture: None, is_bad_input: false },
                         to_write,
@@ -109,7 +110,7 @@ impl RenderStage {
                     && !self.shared.settings.force
                     && let Ok(image) = self.shared.kept(task, camera, &output)
                 {
-                    made.image = image;
+                    made.image = Box::new(image);
                     self.hand_on(made, to_write)?;
                     continue;
                 }

@@ -6,7 +6,8 @@
 use super::budget::Budget;
 use super::content::HashCache;
 use super::describe::{accel_name, blank};
-use super::fingerprint::{CameraOrigin, Wanted};
+use super::elsewhere::{Elsewhere, cameras_from_elsewhere};
+use super::fingerprint::Wanted;
 use super::html;
 use super::input::Input;
 use super::job::{Plan, plan};
@@ -15,13 +16,13 @@ use super::memory::MemoryBudget;
 use super::output::{WriteError, check_writable, sweep, write_atomic};
 use super::render_stage::RenderStage;
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Status};
-use super::settings::{BatchSettings, FileSettings, Task};
+use super::settings::{BatchSettings, Task};
 use super::size::{PictureSize, check_crop};
 use super::up_to_date::{Kept, Why, check};
 use super::write_stage::WriteStage;
 use crate::camera::Camera;
 use crate::render::{Progress, pool};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel, sync_channel};
@@ -98,7 +99,7 @@ pub(super) struct Shared {
     pub settings: BatchSettings,
     pub plan: Plan,
     /// For each task the cameras that it is to be seen by, if not by its own, and where they come from.
-    pub elsewhere: Vec<(Option<Arc<[Camera]>>, CameraOrigin)>,
+    pub elsewhere: Vec<Elsewhere>,
     /// Contents of files that were hashed.
     pub hashes: HashCache,
     /// Memory that may be used.
@@ -145,23 +146,23 @@ impl Shared {
     /// What is asked for of a task's camera.
     pub fn wanted(&self, task: usize, camera: usize) -> Wanted<'_> {
         let Task { input, settings } = &self.settings.tasks[task];
-        Wanted { input: &input.path, settings, origin: &self.elsewhere[task].1, camera }
+        Wanted { input: &input.path, settings, origin: &self.elsewhere[task].origin, camera }
     }
 
     /// The image as an earlier run left it, if that is what this run would write; else why not.
-    pub fn kept(&self, task: usize, camera: usize, output: &Path) -> Result<Box<ImageReport>, Why> {
+    pub fn kept(&self, task: usize, camera: usize, output: &Path) -> Result<ImageReport, Why> {
         let json = self.path(output, "json");
         let Kept { report, outputs } = check(&json, &self.wanted(task, camera), &self.hashes)?;
         let path = |kind: &str| {
             let of_kind = outputs.iter().find(|path| path.extension().is_some_and(|e| e == kind));
             of_kind.map(|path| path.display().to_string())
         };
-        Ok(Box::new(ImageReport {
+        Ok(ImageReport {
             status: Status::UpToDate,
             input: self.settings.tasks[task].input.path.display().to_string(),
             outputs: Outputs { exr: path("exr"), png: path("png"), json: Some(json.display().to_string()) },
             ..report
-        }))
+        })
     }
 
     /// `<out>/<output>.<extension>`.
@@ -225,7 +226,7 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         }
         memory.check_picture(settings).map_err(Stop::Usage)?;
     }
-    let names: Vec<_> = elsewhere.iter().map(|(cameras, _)| cameras.as_deref().map(names_of)).collect();
+    let names: Vec<_> = elsewhere.iter().map(Elsewhere::names).collect();
     let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
     let threads = |error: crate::error::RenderError| Stop::Usage(format!("--threads: {error}"));
     let (rendering, beside) = (pool(settings.threads).map_err(threads)?, pool(settings.threads).map_err(threads)?);
@@ -293,31 +294,6 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
     let strict = report.images.iter().filter(|image| !image.strict_failures().is_empty());
     let strict_failures = if settings.strict { strict.count() } else { 0 };
     Ok(Outcome { report, bad_inputs, unwritable, interrupted, strict_failures })
-}
-
-/// The cameras that each task is to be seen by, if not by its own; read once for all tasks that share settings.
-pub(super) fn cameras_from_elsewhere(
-    tasks: &[Task],
-    hashes: &HashCache,
-) -> Result<Vec<(Option<Arc<[Camera]>>, CameraOrigin)>, String> {
-    let mut known: HashMap<*const FileSettings, (Option<Arc<[Camera]>>, CameraOrigin)> = HashMap::new();
-    tasks
-        .iter()
-        .map(|Task { settings, .. }| {
-            if let Some(cameras) = known.get(&Arc::as_ptr(settings)) {
-                return Ok(cameras.clone());
-            }
-            let (cameras, origin) = CameraOrigin::read(&settings.camera_source, hashes)?;
-            let cameras: Option<Arc<[Camera]>> = cameras.map(Into::into);
-            if let Some(cameras) = &cameras {
-                // What is not there is there for no input.
-                let source = settings.camera_source.options();
-                settings.cameras.select(&names_of(cameras)).map_err(|error| format!("{source}: {error}"))?;
-            }
-            known.insert(Arc::as_ptr(settings), (cameras.clone(), origin.clone()));
-            Ok((cameras, origin))
-        })
-        .collect()
 }
 
 /// For each task the images that will come of it, as far as that is known, by their cameras' names in reports.

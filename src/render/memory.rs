@@ -46,6 +46,16 @@ impl MemoryEstimate {
         self.program.saturating_add(rendering.max(self.loading))
     }
 
+    /// The parts that are there at once when most is used, by name: they add up to [`MemoryEstimate::peak`].
+    pub fn at_peak(&self) -> Vec<(&'static str, u64)> {
+        let [program, loading, left_over, scene, prepared, building, film, files] = self.parts();
+        if program.1.saturating_add(loading.1) == self.peak() {
+            return vec![program, loading];
+        }
+        let passing = [building, film, files].into_iter().max_by_key(|(_, bytes)| *bytes).unwrap_or(film);
+        vec![program, left_over, scene, prepared, passing]
+    }
+
     /// Every part by name.
     pub fn parts(&self) -> [(&'static str, u64); 8] {
         [
@@ -80,7 +90,8 @@ const THREAD: u64 = 1 << 20;
 pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let window = window(settings);
     let pixels = u64::from(window.width).saturating_mul(u64::from(window.height));
-    let threads = settings.threads.unwrap_or_else(rayon::current_num_threads) as u64;
+    let threads = settings.threads.or_else(|| std::thread::available_parallelism().ok().map(Into::into));
+    let threads = threads.unwrap_or(1) as u64;
     // Four f32 a block, and 3 f32 of the mean; a hundredth for what the allocator needs.
     let film = pixels.saturating_mul(16 * u64::from(BLOCKS.min(settings.spp)) + 12);
     let film = film.saturating_add(film / 100);

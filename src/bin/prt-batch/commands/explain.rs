@@ -176,7 +176,7 @@ fn light_lines(plan: &Explanation, lines: &mut Lines) {
 }
 
 fn memory_text(memory: &MemoryPlan) -> String {
-    let parts: Vec<String> = (memory.parts.parts().into_iter())
+    let parts: Vec<String> = (memory.parts.at_peak().into_iter())
         .filter(|(_, bytes)| *bytes > 0)
         .map(|(name, bytes)| format!("{name} {}", amount(bytes)))
         .collect();

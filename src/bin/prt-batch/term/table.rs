@@ -48,6 +48,10 @@ pub fn lines(images: &[ImageReport], format: Format, report: &str) -> Vec<String
     let mut kept: Vec<usize> = (0..HEAD.len()).collect();
     if let Some(columns) = format.columns {
         let others = |kept: &[usize]| kept.iter().map(|&i| if i == IMAGE { 0 } else { widths[i] + 2 }).sum::<usize>();
+        // Rather than names, what is known of no image.
+        if others(&kept) + widths[IMAGE] > columns {
+            kept.retain(|&i| i < 2 || cells.iter().any(|row| row[i] != "-"));
+        }
         for lost in FIRST_LOST {
             if others(&kept) + LEAST_NAME > columns {
                 kept.retain(|&i| i != lost);
@@ -109,8 +113,9 @@ fn row(image: &ImageReport) -> [String; 8] {
         name(image),
         size(image).unwrap_or_else(none),
         spp,
-        seconds(image.seconds.total),
-        image.mrays_per_s.map_or_else(none, mrays),
+        // What is known of one that was up to date is from the run that rendered it.
+        if image.status == Status::UpToDate { none() } else { seconds(image.seconds.total) },
+        image.mrays_per_s.filter(|_| is_rendered).map_or_else(none, mrays),
         error,
         if warnings == 0 { none() } else { warnings.to_string() },
     ]
@@ -163,7 +168,7 @@ mod tests {
     fn several() -> Vec<ImageReport> {
         let mut warned = rendered("光の部屋", 125.0);
         warned.warnings = vec!["a".into(), "b".into()];
-        let up_to_date = ImageReport { status: Status::UpToDate, mrays_per_s: None, ..rendered("old", 0.001) };
+        let up_to_date = ImageReport { status: Status::UpToDate, ..rendered("old", 0.001) };
         let left_out = ImageReport { status: Status::Interrupted, ..ImageReport::default() };
         vec![rendered("a rather long name of a scene", 3.1), warned, failed("broken"), up_to_date, left_out]
     }
@@ -177,7 +182,7 @@ status      image                                          size  spp        time
 rendered    renders/a rather long name of a scene.exr  1280x720   64       3.1 s      82      -         -
 rendered    renders/光の部屋.exr                       1280x720   64  2 min 05 s      82      -         2
 failed      scenes/broken.gltf                         /meshes/0: there is no such mesh
-up to date  renders/old.exr                            1280x720   64        1 ms       -      -         -
+up to date  renders/old.exr                            1280x720   64           -       -      -         -
 "
         );
     }
@@ -191,7 +196,7 @@ status      image                     size        time  warnings
 rendered    render.. a scene.exr  1280x720       3.1 s         -
 rendered    renders/光の部屋.exr  1280x720  2 min 05 s         2
 failed      scenes/broken.gltf    /meshes/0: there is no such me
-up to date  renders/old.exr       1280x720        1 ms         -
+up to date  renders/old.exr       1280x720           -         -
 "
         );
     }
