@@ -100,9 +100,11 @@ fn camera_from_gives_every_input_the_cameras_of_another_file() {
 fn a_file_seen_by_its_own_cameras_from_elsewhere_is_the_same_picture() {
     let root = folder();
     images(root.path(), &["a.gltf", "--width", "16"]);
-    let own = fs::read(root.path().join("renders/a.exr")).unwrap();
+    // Pixels: the settings, and so the fingerprint in the file, are others.
+    let pixels = || prt::image::exr_read::read(&root.path().join("renders/a.exr")).unwrap().pixels;
+    let own = pixels();
     images(root.path(), &["a.gltf", "--width", "16", "--camera-from", "a.gltf"]);
-    assert_eq!(fs::read(root.path().join("renders/a.exr")).unwrap(), own);
+    assert!(pixels() == own && own.iter().flatten().any(|value| *value > 0.0));
 }
 
 #[test]

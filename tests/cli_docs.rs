@@ -82,7 +82,8 @@ fn bash_can_read_its_completions() {
     let folder = tempfile::tempdir().unwrap();
     let script = folder.path().join("completions");
     fs::write(&script, printed(&["--generate", "complete-bash"])).unwrap();
-    let complete = r#"source "$0"; COMP_WORDS=(prt-batch a.gltf --accel li); COMP_CWORD=3; [[ $(complete -p prt-batch) =~ -F\ ([^ ]+) ]] && "${BASH_REMATCH[1]}" prt-batch li --accel
+    let complete = r#"source "$0"; COMP_WORDS=(prt-batch a.gltf --accel li); COMP_CWORD=3
+        [[ $(complete -p prt-batch) =~ -F\ ([^ ]+) ]] && "${BASH_REMATCH[1]}" prt-batch li --accel
         echo "${COMPREPLY[*]}""#;
     match Command::new("bash").args(["-c", complete]).arg(&script).output() {
         Ok(output) => assert_eq!(String::from_utf8_lossy(&output.stdout), "linear\n", "{output:?}"),

@@ -1,6 +1,7 @@
 //! Tests of the engine.
 
 use super::*;
+use crate::batch::FileSettings;
 use crate::batch::input::expand;
 use crate::render::RenderSettings;
 

@@ -30,8 +30,8 @@ const OPTIONS: &[Unbuilt] = &[
         "Sampling",
         "time-limit",
         "30s",
-        "Stop an image's sampling; ends only at wave boundaries, and the JSON says the spp reached, with which the bytes \
-         can be repeated [default: off]",
+        "Stop an image's sampling; ends only at wave boundaries, and the JSON says the spp reached, with which the \
+         bytes can be repeated [default: off]",
     ),
     option("Sampling", "batch-time-limit", "8h", "Share a whole batch's time [default: off]"),
     option(
@@ -72,8 +72,8 @@ const OPTIONS: &[Unbuilt] = &[
         "Animation",
         "frames",
         "all|1-24|1-100x2|1,5,9",
-        "Frame f is at t = f/fps; channels clamp outside their keys; all = 0..ceil(duration x fps) [default: the file as \
-         written, no animation]",
+        "Frame f is at t = f/fps; channels clamp outside their keys; all = 0..ceil(duration x fps) [default: the file \
+         as written, no animation]",
     ),
     option("Animation", "fps", "N", "Frames a second [default: 24]"),
     option("Animation", "animation", "INDEX|NAME|all", "Which animation [default: 0]"),

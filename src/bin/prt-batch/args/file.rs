@@ -34,7 +34,8 @@ pub struct FileArgs {
     ///
     /// Origin top left, y down (EXR data window; the display window stays whole). Its pixels equal those of the whole
     /// picture.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, allow_hyphen_values = true, help_heading = PICTURES)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse::crop, allow_hyphen_values = true)]
+    #[arg(help_heading = PICTURES)]
     pub crop: Option<CropWindow>,
     /// Exposure of the PNG in stops, or auto
     ///
@@ -45,7 +46,8 @@ pub struct FileArgs {
     /// Tone curve of the PNG
     ///
     /// The EXR is never touched by it.
-    #[arg(long, value_name = "CURVE", default_value = "neutral", value_parser = parse::tonemap(), help_heading = PICTURES)]
+    #[arg(long, value_name = "CURVE", default_value = "neutral", value_parser = parse::tonemap())]
+    #[arg(help_heading = PICTURES)]
     pub tonemap: ToneCurve,
     /// Single-sided surfaces are invisible to camera rays from behind
     #[arg(long, help_heading = PICTURES)]
@@ -95,7 +97,8 @@ pub struct FileArgs {
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
     pub seed: u64,
     /// What is computed
-    #[arg(long, value_name = "NAME", default_value = "path", value_parser = parse::integrator(), help_heading = SAMPLING)]
+    #[arg(long, value_name = "NAME", default_value = "path", value_parser = parse::integrator())]
+    #[arg(help_heading = SAMPLING)]
     pub integrator: &'static str,
     /// Scatterings after the first; 0 = emitted and direct light only [default: unlimited]
     ///
@@ -107,7 +110,8 @@ pub struct FileArgs {
     ///
     /// appendix-b: the single-scattering formulas of glTF 2.0 appendix B with height-correlated G, for comparison with
     /// other renderers. full: energy-compensated, conserving; it will be the default when it is built.
-    #[arg(long, value_name = "MODEL", default_value = "appendix-b", value_parser = parse::brdf(), help_heading = SAMPLING)]
+    #[arg(long, value_name = "MODEL", default_value = "appendix-b", value_parser = parse::brdf())]
+    #[arg(help_heading = SAMPLING)]
     pub brdf: Brdf,
     /// Pixel filter: box or tent, :WIDTH = full support in pixels
     ///
@@ -126,7 +130,8 @@ pub struct FileArgs {
     /// auto: on when the file has no punctual and no image-based light, what of it emits more than 1 nit gives less
     /// than 0.02 lm per m^2 of all its surface, and less than half of its surface emits; figures and choice are logged
     /// and recorded. Of a scene that has an environment of its own, that one is used.
-    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light(), help_heading = LIGHT)]
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light())]
+    #[arg(help_heading = LIGHT)]
     pub default_light: DefaultLight,
 
     /// Output name from {stem} {parent} {camera} [default: {stem}, with .{camera} if a file has several]
@@ -143,7 +148,8 @@ pub struct FileArgs {
     #[arg(long, value_name = "TYPE", default_value = "float", value_parser = parse::exr(), help_heading = FILES)]
     pub exr: ExrSamples,
     /// Compression of the EXR; all are lossless
-    #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression(), help_heading = FILES)]
+    #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression())]
+    #[arg(help_heading = FILES)]
     pub exr_compression: ExrCompression,
     /// Write no PNG
     #[arg(long, help_heading = FILES)]

@@ -13,7 +13,8 @@ pub struct RunArgs {
     /// Where files go
     ///
     /// The folder is made if it is not there. In a config file it is relative to that file's folder.
-    #[arg(short, long, value_name = "DIR", default_value = "renders", help_heading = RUN, value_hint = ValueHint::DirPath)]
+    #[arg(short, long, value_name = "DIR", default_value = "renders")]
+    #[arg(help_heading = RUN, value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
     /// Options and inputs from a file; the command line wins
     ///
@@ -54,8 +55,10 @@ pub struct RunArgs {
     pub no_report: bool,
     /// How far the run is, on stderr
     ///
-    /// auto shows bars on a terminal, else plain lines; plain at most one line a second; json a line of JSON now and then.
-    #[arg(long, value_name = "STYLE", default_value = "auto", value_parser = parse::progress(), help_heading = TERMINAL)]
+    /// auto shows bars on a terminal, else plain lines; plain at most one line a second; json a line of JSON now and
+    /// then.
+    #[arg(long, value_name = "STYLE", default_value = "auto", value_parser = parse::progress())]
+    #[arg(help_heading = TERMINAL)]
     pub progress: ProgressStyle,
     /// Print the run's batch.json on stdout
     ///
