@@ -12,9 +12,6 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         Ok(meaning) => meaning,
         Err(message) => return term::usage(&message),
     };
-    if !args.quiet {
-        warnings.iter().for_each(|warning| term::warning(warning));
-    }
     let settings = BatchSettings {
         tasks,
         out: args.out.clone(),
@@ -26,7 +23,9 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         command: command_line(),
         ..BatchSettings::default()
     };
+    let warn = || warnings.iter().filter(|_| !args.quiet).for_each(|warning| term::warning(warning));
     if args.explain {
+        warn();
         return super::explain::run(&settings, args.json);
     }
     let verbosity = match (args.quiet, args.verbose) {
@@ -35,6 +34,8 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         _ => Verbosity::Normal,
     };
     let mut reporter = Reporter::new(args.progress, verbosity);
+    // Behind the reporter, which decides how warnings look.
+    warn();
     if let Err(error) = signals::install(&settings.cancel) {
         term::warning(&format!("signals will end the process at once: {error}"));
     }
