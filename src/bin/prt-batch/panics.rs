@@ -13,7 +13,7 @@ pub fn guarded(program: impl FnOnce() -> ExitCode) -> ExitCode {
         remember(info);
         let trace = Backtrace::capture();
         if trace.status() == BacktraceStatus::Captured {
-            term::say(&format!("{info}\n{trace}"));
+            term::say_in_panic(&format!("{info}\n{trace}"));
         }
     }));
     catch_unwind(AssertUnwindSafe(program)).unwrap_or_else(|payload| {

@@ -17,7 +17,7 @@ mod table;
 mod text;
 mod watch;
 
-pub use output::{error, interrupted, say, warning};
+pub use output::{error, interrupted, say, say_in_panic, warning};
 pub use reporter::Reporter;
 
 use std::io::Write;

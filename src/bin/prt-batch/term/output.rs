@@ -60,6 +60,12 @@ pub fn say(text: &str) {
     tell(Level::Info, text);
 }
 
+/// Prints `text` as [`say`] does, or straight where this very thread may be at it: from a panic hook.
+pub fn say_in_panic(text: &str) {
+    let is_free = CHANNEL.try_lock().is_ok();
+    if is_free { say(text) } else { write(text) }
+}
+
 /// Prints an error.
 pub fn error(text: &str) {
     tell(Level::Error, text);
