@@ -79,6 +79,8 @@ def pixel():
 
 
 if __name__ == "__main__":
+    if not 2 <= len(sys.argv) <= 4 or sys.argv[1].startswith("-"):
+        sys.exit(__doc__)
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     big(folder / "big.glb", float(sys.argv[2]) if len(sys.argv) > 2 else 190)

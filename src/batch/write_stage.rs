@@ -5,6 +5,7 @@ use super::develop::develop;
 use super::fingerprint::Fingerprint;
 use super::load_stage::Sources;
 use super::output::{WriteError, write_atomic};
+use super::panics::guarded;
 use super::picture::exr_bytes;
 use super::render_stage::fail;
 use super::report::{self, ExposureReport, ImageReport, Status};
@@ -75,7 +76,11 @@ impl WriteStage {
         let clock = Instant::now();
         let mut written = Ok(());
         if let (Some(output), Some(picture)) = (&output, picture) {
-            written = self.pictures(task, &picture, output, &mut image);
+            let pictures = guarded(|| Ok(self.pictures(task, &picture, output, &mut image)));
+            written = pictures.unwrap_or_else(|message| {
+                fail(&mut image, format!("{}: {message}", image.input));
+                Ok(())
+            });
             image.seconds.write = Some(clock.elapsed().as_secs_f64());
             image.seconds.total += clock.elapsed().as_secs_f64();
         }

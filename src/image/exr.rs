@@ -96,6 +96,10 @@ pub enum ExrValue {
     Double(f64),
 }
 
+/// Pixels up to which one thread compresses: exr starts a pool of threads for every picture, which took longer than a
+/// picture of this size.
+const SMALL: usize = 1 << 15;
+
 /// The bytes of an EXR of `picture`.
 ///
 /// # Errors
@@ -105,6 +109,7 @@ pub fn encode(picture: &ExrPicture<'_>, options: ExrOptions) -> std::result::Res
     if picture.pixels.len() != size[0] * size[1] {
         return Err(format!("EXR: {} pixels do not fill {} x {}", picture.pixels.len(), size[0], size[1]));
     }
+    let is_small = picture.pixels.len() <= SMALL;
     let pixel = |at: Vec2<usize>| picture.pixels[at.y() * size[0] + at.x()];
     let mut bytes = Cursor::new(Vec::new());
     match options.samples {
@@ -113,14 +118,22 @@ pub fn encode(picture: &ExrPicture<'_>, options: ExrOptions) -> std::result::Res
                 let [r, g, b] = pixel(at);
                 (r, g, b, 1.0_f32)
             };
-            image(picture, options.compression, SpecificChannels::rgba(float)).write().to_buffered(&mut bytes)
+            let image = image(picture, options.compression, SpecificChannels::rgba(float));
+            match is_small {
+                true => image.write().non_parallel().to_buffered(&mut bytes),
+                false => image.write().to_buffered(&mut bytes),
+            }
         }
         ExrSamples::Half => {
             let half = |at| {
                 let [r, g, b] = pixel(at).map(half);
                 (r, g, b, f16::ONE)
             };
-            image(picture, options.compression, SpecificChannels::rgba(half)).write().to_buffered(&mut bytes)
+            let image = image(picture, options.compression, SpecificChannels::rgba(half));
+            match is_small {
+                true => image.write().non_parallel().to_buffered(&mut bytes),
+                false => image.write().to_buffered(&mut bytes),
+            }
         }
     }
     .map_err(|error| format!("EXR: {error}"))?;

@@ -12,6 +12,7 @@ use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
 use crate::texture::Texels;
 use serde::Serialize;
+use std::sync::OnceLock;
 
 /// Bytes by what they are for. A part that is not known yet is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -86,12 +87,17 @@ const EMBREE_LIBRARY: u64 = 7 << 20;
 /// A thread with its paths (`integrator::pool`, about 200 bytes a path) and its stack as far as used.
 const THREAD: u64 = 1 << 20;
 
+/// Cores this process may use; asked once, as the answer takes reading half a dozen of the system's files.
+fn cores() -> usize {
+    static CORES: OnceLock<usize> = OnceLock::new();
+    *CORES.get_or_init(|| std::thread::available_parallelism().map_or(1, Into::into))
+}
+
 /// What a picture takes that depends on its size alone: everything that can be known before the input is read.
 pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let window = window(settings);
     let pixels = u64::from(window.width).saturating_mul(u64::from(window.height));
-    let threads = settings.threads.or_else(|| std::thread::available_parallelism().ok().map(Into::into));
-    let threads = threads.unwrap_or(1) as u64;
+    let threads = settings.threads.unwrap_or_else(cores) as u64;
     // Four f32 a block, and 3 f32 of the mean; a hundredth for what the allocator needs.
     let film = pixels.saturating_mul(16 * u64::from(BLOCKS.min(settings.spp)) + 12);
     let film = film.saturating_add(film / 100);
