@@ -78,7 +78,9 @@ impl WriteStage {
         if let (Some(output), Some(picture)) = (&output, picture) {
             let pictures = guarded(|| Ok(self.pictures(task, &picture, output, &mut image)));
             written = pictures.unwrap_or_else(|message| {
-                fail(&mut image, format!("{}: {message}", image.input));
+                let input = &image.input;
+                let message = format!("{input}: {message}");
+                fail(&mut image, message);
                 Ok(())
             });
             image.seconds.write = Some(clock.elapsed().as_secs_f64());
