@@ -28,14 +28,23 @@ impl std::error::Error for WriteError {}
 /// # Errors
 /// The first step that the system refused.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    write_whole(path, bytes)?;
+    sync_folder(folder_of(path)).map_err(|error| WriteError { path: path.to_owned(), error })
+}
+
+/// [`write_atomic`] of one of several files in a folder, of which the last is to be written by that: the file is whole
+/// under its name, but until the folder is synced too a power cut may take it back to what it was.
+///
+/// # Errors
+/// The first step that the system refused.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let fail = |error| WriteError { path: path.to_owned(), error };
     let folder = folder_of(path);
     fs::create_dir_all(folder).map_err(fail)?;
     let (temporary, mut file) = Temporary::create(folder).map_err(fail)?;
     file.write_all(bytes).and_then(|()| file.sync_all()).map_err(fail)?;
     drop(file);
-    fs::rename(&temporary.0, path).map_err(fail)?;
-    sync_folder(folder).map_err(fail)
+    fs::rename(&temporary.0, path).map_err(fail)
 }
 
 /// Makes `folder` and shows by a file that it can be written to.

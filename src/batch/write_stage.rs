@@ -4,7 +4,7 @@ use super::budget::Grant;
 use super::develop::develop;
 use super::fingerprint::Fingerprint;
 use super::load_stage::Sources;
-use super::output::{WriteError, write_atomic};
+use super::output::{WriteError, write_atomic, write_whole};
 use super::panics::guarded;
 use super::picture::exr_bytes;
 use super::render_stage::fail;
@@ -155,7 +155,8 @@ impl WriteStage {
         fingerprint: &mut Option<Fingerprint>,
     ) -> Result<String, WriteError> {
         let path = self.shared.path(output, extension);
-        write_atomic(&path, bytes)?;
+        // The report, which is written last and into the same folder, syncs the folder for all three.
+        write_whole(&path, bytes)?;
         if let Some(fingerprint) = fingerprint {
             fingerprint.add_output(extension, bytes);
         }
