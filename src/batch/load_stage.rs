@@ -61,7 +61,9 @@ impl Sources {
         let (done, hashing) = channel();
         let with_cache = Arc::clone(shared);
         shared.beside.spawn(move || {
-            let hashed = hash_sources(&sources, &with_cache.hashes).map_err(|changed| changed.to_string());
+            // A panic of a task that nobody waits for would end the process.
+            let hash = || hash_sources(&sources, &with_cache.hashes).map_err(|changed| changed.to_string());
+            let hashed = guarded(hash);
             // Nobody waits for it when the run was ended.
             let _ = done.send(hashed);
         });
@@ -111,16 +113,16 @@ impl LoadStage {
         };
         let reading = match &input.problem {
             Some(problem) => Err(problem.to_string()),
-            None => shared.memory.check_loading(&input.path, settings),
+            None => guarded(|| shared.memory.check_loading(&input.path, settings)),
         };
         // Waits until there is room beside the scene that is rendered.
         let bytes = reading.as_ref().map_or(0, |reading| reading.bytes);
         let mut grant = shared.budget.grant(bytes, &shared.stop)?;
         progress.enter(Phase::Loading);
         let clock = Instant::now();
-        let contents = reading.and_then(|reading| {
+        let read = |reading| {
             let load = || load(&input.path, &settings.load).map_err(|error| error.to_string());
-            let (mut scene, times) = shared.beside.install(|| guarded(load))?;
+            let (mut scene, times) = shared.beside.install(load)?;
             if let Some(cameras) = &shared.elsewhere[task].cameras {
                 settings.camera_source.replace(&mut scene, cameras);
             }
@@ -128,17 +130,15 @@ impl LoadStage {
             let chosen = settings.cameras.select(&names);
             let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;
             let sources = Sources::hash(&self.shared, std::mem::take(&mut scene.sources));
-            Ok(SceneFile { scene, sources, times, names, chosen, why, reading, grant: None })
-        });
+            // What the most demanding of its images takes; whether that fits is asked for each of them.
+            let of_camera = |&camera: &usize| need(&scene, reading, &sized(settings, &scene, camera), settings).peak();
+            let most = chosen.iter().map(of_camera).max().unwrap_or(0);
+            Ok((SceneFile { scene, sources, times, names, chosen, why, reading, grant: None }, most))
+        };
+        let contents = reading.and_then(|reading| guarded(|| read(reading)));
         let seconds = clock.elapsed().as_secs_f64();
         let contents = match contents {
-            Ok(mut file) => {
-                // What the most demanding of its images takes; whether that fits is asked for each of them.
-                let of_camera = |&camera: &usize| {
-                    let render = sized(settings, &file.scene, camera);
-                    need(&file.scene, file.reading, &render, settings).peak()
-                };
-                let most = file.chosen.iter().map(of_camera).max().unwrap_or(0);
+            Ok((mut file, most)) => {
                 if !grant.resize(most.min(shared.memory.bytes), &shared.stop) {
                     return None;
                 }

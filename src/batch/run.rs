@@ -9,7 +9,6 @@ use super::describe::{accel_name, blank};
 use super::elsewhere::{Elsewhere, cameras_from_elsewhere};
 use super::fingerprint::Wanted;
 use super::html;
-use super::input::Input;
 use super::job::{Plan, plan};
 use super::load_stage::LoadStage;
 use super::memory::MemoryBudget;
@@ -258,30 +257,14 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         }
     }
 
-    let settings = &shared.settings;
-    let before = images.len();
+    let done = images.len();
     if shared.is_stopped() {
-        for (task, jobs) in jobs.iter().enumerate() {
-            let done = images.iter().filter(|(t, _)| *t == task).count();
-            images.extend(jobs.iter().skip(done).map(|camera| (task, left_out(&settings.tasks[task], camera.clone()))));
-        }
+        images.extend(left_out(&shared.settings.tasks, &jobs, &images));
     }
-    let interrupted = images.len() > before && settings.cancel.load(Ordering::Relaxed);
+    let interrupted = images.len() > done && shared.settings.cancel.load(Ordering::Relaxed);
     let images: Vec<ImageReport> = images.into_iter().map(|(_, image)| image).collect();
-    let requested = settings.tasks.first().map_or_else(Default::default, |task| task.settings.render.accel);
-    let requested = Accel { requested: accel_name(requested).into(), ..Accel::default() };
-    let chosen = images.iter().map(|image| &image.accel).find(|accel| accel.used.is_some());
-    let count = |status| images.iter().filter(|image| image.status == status).count();
-    let report = BatchReport {
-        prt: crate::VERSION,
-        command: settings.command.clone(),
-        started: report::utc(started),
-        seconds: clock.elapsed().as_secs_f64(),
-        host: Host { cpu: report::cpu_name(), threads: shared.beside.current_num_threads() },
-        accel: chosen.cloned().unwrap_or(requested),
-        counts: Status::ALL.iter().map(|&status| (status, count(status))).collect(),
-        images,
-    };
+    let report = batch_report(&shared, images, started, clock);
+    let settings = &shared.settings;
     let mut files = vec![("batch.json", report::to_json(&report))];
     if settings.report {
         files.push(("index.html", html::report(&report, &settings.out)));
@@ -296,6 +279,23 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
     Ok(Outcome { report, bad_inputs, unwritable, interrupted, strict_failures })
 }
 
+fn batch_report(shared: &Shared, images: Vec<ImageReport>, started: SystemTime, clock: Instant) -> BatchReport {
+    let requested = shared.settings.tasks.first().map_or_else(Default::default, |task| task.settings.render.accel);
+    let requested = Accel { requested: accel_name(requested).into(), ..Accel::default() };
+    let chosen = images.iter().map(|image| &image.accel).find(|accel| accel.used.is_some());
+    let count = |status| images.iter().filter(|image| image.status == status).count();
+    BatchReport {
+        prt: crate::VERSION,
+        command: shared.settings.command.clone(),
+        started: report::utc(started),
+        seconds: clock.elapsed().as_secs_f64(),
+        host: Host { cpu: report::cpu_name(), threads: shared.beside.current_num_threads() },
+        accel: chosen.cloned().unwrap_or(requested),
+        counts: Status::ALL.iter().map(|&status| (status, count(status))).collect(),
+        images,
+    }
+}
+
 /// For each task the images that will come of it, as far as that is known, by their cameras' names in reports.
 fn jobs(tasks: &[Task], plan: &Plan) -> Vec<Vec<Option<String>>> {
     let of = |(task, names): (&Task, &Vec<String>)| {
@@ -305,9 +305,18 @@ fn jobs(tasks: &[Task], plan: &Plan) -> Vec<Vec<Option<String>>> {
     tasks.iter().zip(&plan.cameras).map(of).collect()
 }
 
-/// The report of an image that was not done because the run ended.
-fn left_out(Task { input: Input { path, .. }, settings }: &Task, camera: Option<String>) -> ImageReport {
-    ImageReport { status: Status::Interrupted, camera, ..blank(path, settings) }
+/// Reports of the images that were not done because the run ended, each with its task.
+fn left_out(tasks: &[Task], jobs: &[Vec<Option<String>>], done: &[(usize, ImageReport)]) -> Vec<(usize, ImageReport)> {
+    let mut finished = vec![0; tasks.len()];
+    done.iter().for_each(|(task, _)| finished[*task] += 1);
+    let of_task = |(index, Task { input, settings }): (usize, &Task)| {
+        let interrupted = |camera: &Option<String>| {
+            let status = Status::Interrupted;
+            (index, ImageReport { status, camera: camera.clone(), ..blank(&input.path, settings) })
+        };
+        jobs[index].iter().skip(finished[index]).map(interrupted).collect::<Vec<_>>()
+    };
+    tasks.iter().enumerate().flat_map(of_task).collect()
 }
 
 /// The camera's name as reports have it: its index where it has none, `None` for the one framed on the bounds.

@@ -51,13 +51,28 @@ pub fn accel_line(accel: &Accel, note: &str, is_verbose: bool) -> String {
     format!("rays by {}{note}", words.join(" "))
 }
 
-/// Where the time went, what was traced, and what was left out.
+/// Why `--strict` takes an image for a failure; `None` if it does not.
+pub fn strict_failure(image: &ImageReport) -> Option<String> {
+    let failures = image.strict_failures();
+    let first = failures.first()?;
+    let more = if failures.len() > 1 { format!(", and {} more", failures.len() - 1) } else { String::new() };
+    Some(format!("{}: counts as failed (--strict): {first}{more}", printable(&image.input)))
+}
+
+/// Where the time went, what was traced, and what was left out; nothing of an image that is up to date, whose report is
+/// that of another run.
 pub fn details(image: &ImageReport) -> Vec<String> {
+    if image.status == Status::UpToDate {
+        return Vec::new();
+    }
     let s = &image.seconds;
     let phases = [("load", s.load), ("decode", s.decode), ("build", s.build), ("render", s.render), ("write", s.write)];
     let known = phases.into_iter().filter_map(|(name, value)| Some(format!("{name} {}", seconds(value?))));
     let known: Vec<_> = known.collect();
     let mut lines = Vec::new();
+    if !image.why.is_empty() {
+        lines.push(format!("  rendered again: {}", printable(&image.why)));
+    }
     if !known.is_empty() {
         lines.push(format!("  {}", known.join(", ")));
     }
@@ -103,6 +118,21 @@ mod tests {
         let outputs = Outputs { json: Some("renders/cornell.json".into()), ..Outputs::default() };
         let image = ImageReport { outputs, ..rendered() };
         assert!(line(&image, Paint::OFF).starts_with("renders/cornell.json  1280x720"), "{}", line(&image, Paint::OFF));
+    }
+
+    #[test]
+    fn details_say_why_an_image_is_rendered_again_and_nothing_of_what_another_run_did() {
+        let image = ImageReport { why: "settings changed: spp 64 -> 128".into(), ..rendered() };
+        assert_eq!(details(&image)[0], "  rendered again: settings changed: spp 64 -> 128");
+        assert!(details(&ImageReport { status: Status::UpToDate, ..rendered() }).is_empty());
+    }
+
+    #[test]
+    fn strict_names_the_first_loss_and_counts_the_others() {
+        assert_eq!(strict_failure(&rendered()), None);
+        let image = ImageReport { losses: vec!["no wood.png".into(), "no normals".into()], ..rendered() };
+        let told = "scenes/cornell.gltf: counts as failed (--strict): no wood.png, and 1 more";
+        assert_eq!(strict_failure(&image).as_deref(), Some(told));
     }
 
     #[test]

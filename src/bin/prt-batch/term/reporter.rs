@@ -3,7 +3,7 @@
 use super::Verbosity;
 use super::bars::Look;
 use super::board::Board;
-use super::image_lines::{accel_line, details, line, status_word};
+use super::image_lines::{accel_line, details, line, status_word, strict_failure};
 use super::json_lines::{self, Event};
 use super::output::{self, error, interrupted, say, tell};
 use super::repeats::Repeats;
@@ -70,6 +70,9 @@ impl Reporter {
         self.table(&report.images, &out.join("batch.json"));
         if self.verbosity > Verbosity::Quiet {
             self.repeats.rest().iter().for_each(|(level, text)| tell(*level, text));
+        }
+        if outcome.strict_failures > 0 {
+            report.images.iter().filter_map(strict_failure).for_each(|text| error(&text));
         }
         if let Some(stopped) = &outcome.unwritable {
             error(&format!("{stopped}\n  The run stops here; finished images are kept."));
@@ -141,7 +144,8 @@ impl Reporter {
     fn results(&mut self, image: &ImageReport) {
         let is_verbose = self.verbosity == Verbosity::Verbose;
         // Once, and again where another backend takes over: `auto` opens no Embree for a scene that needs none.
-        if image.accel.used.is_some() && image.accel.used != self.accel_said {
+        let is_new = image.status == Status::Rendered && image.accel.used != self.accel_said;
+        if is_new && image.accel.used.is_some() {
             self.accel_said.clone_from(&image.accel.used);
             say(&accel_line(&image.accel, &image.accel_note, is_verbose));
         }
