@@ -113,3 +113,28 @@ fn short_help_is_short_and_long_help_says_more() {
     assert!(compare.contains("Examples:") && compare.contains("Exit codes: 0 within limits"), "{compare}");
     assert_eq!(options_of(&printed(&["render", "-h"])).len() + 2, options_of(&short).len(), "--generate, --version");
 }
+
+/// Whoever adds an option adds a test that runs the program with it: its name stands, as an argument of its own or with
+/// its value, in one of the files that run the program.
+#[test]
+fn every_option_is_used_by_some_test_of_the_program() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let runs_the_program = |path: &Path| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        name.starts_with("cli") && name.ends_with(".rs") && name != "cli_docs.rs"
+    };
+    let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| runs_the_program(path));
+    let text: String = files.map(|path| fs::read_to_string(path).unwrap()).collect();
+    let mut options = options_of(&printed(&["-h"]));
+    for command in ["compare", "retone", "doctor"] {
+        options.extend(options_of(&printed(&[command, "-h"])));
+    }
+    assert!(options.len() > 40, "{options:?}");
+    // Between quotes, or in a line of arguments.
+    let is_used = |option: &String| {
+        let ends = |rest: &str| !rest.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '-');
+        text.match_indices(option.as_str()).any(|(at, _)| ends(&text[at + option.len()..]))
+    };
+    let unused: Vec<_> = options.iter().filter(|option| !is_used(option)).collect();
+    assert!(unused.is_empty(), "no test runs the program with {unused:?}");
+}

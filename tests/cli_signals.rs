@@ -97,7 +97,7 @@ fn a_signal_drops_the_image_under_way_and_says_75_within_two_seconds() {
         ] {
             assert!(text.lines().any(|l| l == line), "{signal}: {text}");
         }
-        assert_eq!(names(&root.path().join("out")), ["batch.json"], "{signal}");
+        assert_eq!(names(&root.path().join("out")), ["batch.json", "index.html"], "{signal}");
         let text = fs::read_to_string(root.path().join("out/batch.json")).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert_eq!(json["counts"]["interrupted"], 2, "{signal}");
@@ -111,7 +111,7 @@ fn what_was_finished_before_the_signal_is_whole_and_nothing_else_is_left() {
     let args = [".", "-o", "out", "--size", "64x64", "-s", "64", "--accel", "linear", "--progress", "plain"];
     let mut run = Running::start(Command::new(BIN).args(args), root.path());
     let mut lines = run.stderr().lines().map(|line| line.expect("messages are UTF-8"));
-    (0..3).for_each(|_| drop(lines.find(|line| line.contains("64x64")).expect("images are finished")));
+    (0..3).for_each(|_| drop(lines.find(|line| line.contains("64 spp")).expect("images are finished")));
     run.signal("TERM");
     run.signal("TERM");
     let rest: Vec<_> = lines.collect();
@@ -126,7 +126,7 @@ fn what_was_finished_before_the_signal_is_whole_and_nothing_else_is_left() {
     assert_eq!(rest.last(), Some(&last));
     // The scenes are equal, and so are the pictures.
     let first = fs::read(out.join("s000.exr")).unwrap();
-    let mut expected = vec!["batch.json".to_owned()];
+    let mut expected = vec!["batch.json".to_owned(), "index.html".to_owned()];
     for image in images.iter().filter(|image| image["status"] == "rendered") {
         let stem = image["input"].as_str().unwrap().trim_start_matches("./").trim_end_matches(".gltf").to_owned();
         assert!(fs::read(out.join(format!("{stem}.exr"))).unwrap() == first, "{stem}.exr is not whole");
