@@ -137,6 +137,7 @@ impl LoadStage {
         };
         let contents = reading.and_then(|reading| guarded(|| read(reading)));
         let seconds = clock.elapsed().as_secs_f64();
+        progress.enter(Phase::Waiting);
         let contents = match contents {
             Ok((mut file, most)) => {
                 if !grant.resize(most.min(shared.memory.bytes), &shared.stop) {

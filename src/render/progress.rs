@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering::Relaxed};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Phase {
-    /// Nothing yet.
+    /// Nothing: it is not begun, or read and waiting for its turn.
     #[default]
     Waiting,
     /// Its file is read, its pictures decoded.

@@ -30,7 +30,8 @@ pub struct Board {
 struct UnderWay {
     id: ImageId,
     name: String,
-    since: Instant,
+    /// What was being done when it was last looked at, and since when.
+    phase: (Phase, Instant),
     progress: Arc<Progress>,
     /// When it was first seen to be rendered, and the samples and rays that it had then.
     rendering: Option<(Instant, u64, u64)>,
@@ -55,7 +56,7 @@ pub struct ImageView {
     pub id: ImageId,
     pub name: String,
     pub phase: Phase,
-    /// Since work on it started.
+    /// Since its phase began: one that was read early waits for its turn.
     pub elapsed: f64,
     /// Camera samples finished, and to do in all; 0 until known.
     pub done: u64,
@@ -115,7 +116,7 @@ impl Board {
     pub fn start(&mut self, image: &Started, now: Instant) {
         let name = super::text::printable(&image.output.display().to_string());
         let progress = Arc::clone(&image.progress);
-        self.under_way.push(UnderWay { id: image.id, name, since: now, progress, rendering: None });
+        self.under_way.push(UnderWay { id: image.id, name, phase: (Phase::Waiting, now), progress, rendering: None });
     }
 
     /// An image is done.
@@ -163,7 +164,10 @@ impl UnderWay {
         let phase = progress.phase();
         let counts = [&progress.done, &progress.total, &progress.rays];
         let [done, total, rays] = counts.map(|count| count.load(Relaxed));
-        let elapsed = now.duration_since(self.since).as_secs_f64();
+        if self.phase.0 != phase {
+            self.phase = (phase, now);
+        }
+        let elapsed = now.duration_since(self.phase.1).as_secs_f64();
         let mut view =
             ImageView { id: self.id, name: self.name.clone(), phase, elapsed, done, total, rays, ..Default::default() };
         if phase == Phase::Rendering && total > 0 {
@@ -203,7 +207,9 @@ mod tests {
         let started = image(0);
         board.start(&started, start);
         started.progress.enter(Phase::Loading);
-        assert_eq!(board.view(after(start, 5.0)).images[0].left, None);
+        let loading = board.view(after(start, 4.0));
+        assert_eq!((loading.images[0].left, loading.images[0].elapsed), (None, 0.0));
+        assert_eq!(board.view(after(start, 5.0)).images[0].elapsed, 1.0);
         started.progress.enter(Phase::Rendering);
         started.progress.total.store(1000, Relaxed);
         assert_eq!(board.view(after(start, 5.0)).images[0].samples_per_s, None, "nothing is known in the first moment");
