@@ -2,7 +2,7 @@
 //!
 //! One file that needs nothing but the pictures beside it: no script, no font, no network. Links are relative to the
 //! output folder, so that the folder may be moved or zipped. Written by hand rather than by a template crate: it is one
-//! page, and [`Escaped`] is all that such a crate would add.
+//! page, and `Escaped` is all that such a crate would add.
 
 use super::report::{BatchReport, ImageReport, Status};
 use std::fmt::{self, Display, Write};

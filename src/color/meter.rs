@@ -82,7 +82,7 @@ impl Luminances {
         self.nth_brightest(rank(share, self.pixels)).map_or(0.0, f64::exp2)
     }
 
-    /// Stops that show the picture best, a multiple of 0.1 (so that it can be typed) within [`MOST_STOPS`]; `None` for a
+    /// Stops that show the picture best, a multiple of 0.1 (so that it can be typed) within `MOST_STOPS`; `None` for a
     /// picture without light.
     pub fn auto_exposure(&self) -> Option<f64> {
         let top = self.nth_brightest(rank(HIGHLIGHTS, self.lit))?;
