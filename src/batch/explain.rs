@@ -3,15 +3,15 @@
 
 use super::content::HashCache;
 use super::describe::{accel_name, default_light_name};
-use super::elsewhere::{Elsewhere, cameras_from_elsewhere};
+use super::elsewhere::Elsewhere;
 use super::fingerprint::{CameraOrigin, Wanted};
-use super::job::{Plan, plan};
+use super::job::Plan;
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
 use super::report::{Accel, DefaultLight, Outputs};
-use super::run::{Stop, names_of, reported_name};
-use super::settings::{BatchSettings, FileSettings, Task};
-use super::size::{PictureSize, aspect_note, check_crop, size_for};
+use super::run::{Stop, names_of, planned, reported_name};
+use super::settings::{BatchSettings, FileSettings};
+use super::size::{aspect_note, check_crop, size_for};
 use super::up_to_date::check;
 use super::view::CameraSource;
 use crate::camera::{Camera, Projection};
@@ -194,14 +194,7 @@ impl Explained {
 /// What stops a run before anything is rendered, but for the output folder, which is not touched.
 pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> Result<Explained, Stop> {
     let hashes = HashCache::default();
-    let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
-    for Task { settings, .. } in &settings.tasks {
-        if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
-            check_crop(crop, width, height).map_err(Stop::Usage)?;
-        }
-    }
-    let names: Vec<_> = elsewhere.iter().map(Elsewhere::names).collect();
-    let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
+    let (elsewhere, plan) = planned(&settings.tasks, &hashes).map_err(Stop::Usage)?;
     let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };

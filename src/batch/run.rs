@@ -218,15 +218,8 @@ const STACK: usize = 8 << 20;
 pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
     let (started, clock) = (SystemTime::now(), Instant::now());
     let (hashes, memory) = (HashCache::default(), MemoryBudget::new(settings.memory));
-    let elsewhere = cameras_from_elsewhere(&settings.tasks, &hashes).map_err(Stop::Usage)?;
-    for Task { settings, .. } in &settings.tasks {
-        if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
-            check_crop(crop, width, height).map_err(Stop::Usage)?;
-        }
-        memory.check_picture(settings).map_err(Stop::Usage)?;
-    }
-    let names: Vec<_> = elsewhere.iter().map(Elsewhere::names).collect();
-    let plan = plan(&settings.tasks, &names).map_err(Stop::Usage)?;
+    let (elsewhere, plan) = planned(&settings.tasks, &hashes).map_err(Stop::Usage)?;
+    settings.tasks.iter().try_for_each(|task| memory.check_picture(&task.settings)).map_err(Stop::Usage)?;
     let threads = |error: crate::error::RenderError| Stop::Usage(format!("--threads: {error}"));
     let (rendering, beside) = (pool(settings.threads).map_err(threads)?, pool(settings.threads).map_err(threads)?);
     check_writable(&settings.out).map_err(Stop::Unwritable)?;
@@ -277,6 +270,22 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
     let strict = report.images.iter().filter(|image| !image.strict_failures().is_empty());
     let strict_failures = if settings.strict { strict.count() } else { 0 };
     Ok(Outcome { report, bad_inputs, unwritable, interrupted, strict_failures })
+}
+
+/// The cameras of each task and the names of their outputs.
+///
+/// # Errors
+/// What stops a run before anything is rendered, of what does not depend on this machine.
+pub(super) fn planned(tasks: &[Task], hashes: &HashCache) -> Result<(Vec<Elsewhere>, Plan), String> {
+    let elsewhere = cameras_from_elsewhere(tasks, hashes)?;
+    for Task { settings, .. } in tasks {
+        if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
+            check_crop(crop, width, height)?;
+        }
+    }
+    let names: Vec<_> = elsewhere.iter().map(Elsewhere::names).collect();
+    let plan = plan(tasks, &names)?;
+    Ok((elsewhere, plan))
 }
 
 fn batch_report(shared: &Shared, images: Vec<ImageReport>, started: SystemTime, clock: Instant) -> BatchReport {
