@@ -286,15 +286,11 @@ impl File<'_> {
             // As in reports: the file is read for its first image.
             let times = if nth == 0 { times } else { LoadTimes::default() };
             (plan.seconds.load, plan.seconds.decode) = (Some(times.load), Some(times.decode));
-            let path = |extension: &str| {
-                let mut path = self.run.out.join(&output).into_os_string();
-                path.push(extension);
-                path.to_string_lossy().into_owned()
-            };
+            let path = |extension: &str| self.run.path(&output, extension).display().to_string();
             plan.outputs = Outputs {
-                exr: settings.files.exr.then(|| path(".exr")),
-                png: settings.files.png.then(|| path(".png")),
-                json: Some(path(".json")),
+                exr: settings.files.exr.then(|| path("exr")),
+                png: settings.files.png.then(|| path("png")),
+                json: Some(path("json")),
             };
             if self.plan.owners.get(&output).is_some_and(|owner| *owner != self.task) {
                 let output = output.display();

@@ -33,7 +33,7 @@ pub fn cpu_quota() -> Option<f64> {
 
 /// Threads that this process may run at once, by affinity and quota: what `--threads` is by default.
 pub fn threads() -> usize {
-    std::thread::available_parallelism().map_or(1, Into::into)
+    crate::render::memory::cores()
 }
 
 /// Processors of the machine that are switched on, whoever may use them.

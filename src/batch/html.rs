@@ -4,7 +4,7 @@
 //! output folder, so that the folder may be moved or zipped. Written by hand rather than by a template crate: it is one
 //! page, and `Escaped` is all that such a crate would add.
 
-use super::report::{BatchReport, ImageReport, Status};
+use super::report::{BatchReport, ImageReport, Status, seconds};
 use std::fmt::{self, Display, Write};
 use std::path::{Component, Path};
 
@@ -45,7 +45,7 @@ fn page_to(page: &mut String, report: &BatchReport, out: &Path) -> fmt::Result {
     if bad().next().is_some() {
         writeln!(page, "<section class=\"problems\">\n<h2>What went wrong</h2>\n<ul>")?;
         for (index, image) in bad() {
-            let message = image.error_message.as_deref().unwrap_or(status_word(image.status));
+            let message = image.error_message.as_deref().unwrap_or(image.status.word());
             let first = message.lines().next().unwrap_or_default();
             writeln!(page, "<li><a href=\"#i{index}\">{}</a>: {}</li>", Escaped(&name(image, out)), Escaped(first))?;
         }
@@ -70,7 +70,7 @@ fn page_to(page: &mut String, report: &BatchReport, out: &Path) -> fmt::Result {
 }
 
 fn card_to(page: &mut String, index: usize, image: &ImageReport, out: &Path) -> fmt::Result {
-    let status = status_word(image.status);
+    let status = image.status.word();
     let mut classes = status.replace(' ', "-");
     if is_bad(image.status) {
         classes += " bad";
@@ -167,30 +167,8 @@ fn is_bad(status: Status) -> bool {
 
 fn counts(report: &BatchReport) -> String {
     let some = report.counts.iter().filter(|(_, count)| **count > 0);
-    let list: Vec<_> = some.map(|(status, count)| format!("{count} {}", status_word(*status))).collect();
+    let list: Vec<_> = some.map(|(status, count)| format!("{count} {}", status.word())).collect();
     if list.is_empty() { "nothing to do".into() } else { list.join(", ") }
-}
-
-fn status_word(status: Status) -> &'static str {
-    match status {
-        Status::Rendered => "rendered",
-        Status::UpToDate => "up to date",
-        Status::Empty => "empty",
-        Status::Failed => "failed",
-        Status::Interrupted => "interrupted",
-    }
-}
-
-fn seconds(seconds: f64) -> String {
-    match seconds {
-        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
-        s if s < 99.95 => format!("{s:.1} s"),
-        s => {
-            let whole = s.round() as u64;
-            let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
-            if hours > 0 { format!("{hours} h {minutes:02} min") } else { format!("{minutes} min {seconds:02} s") }
-        }
-    }
 }
 
 /// Text as HTML shows it, in elements and in quoted attributes. Control characters, which HTML has no way to write,

@@ -27,6 +27,17 @@ pub enum Status {
 impl Status {
     /// Every status.
     pub const ALL: [Self; 5] = [Self::Rendered, Self::UpToDate, Self::Empty, Self::Failed, Self::Interrupted];
+
+    /// As users read it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Rendered => "rendered",
+            Self::UpToDate => "up to date",
+            Self::Empty => "empty",
+            Self::Failed => "failed",
+            Self::Interrupted => "interrupted",
+        }
+    }
 }
 
 /// One image. Paths as the user would type them.
@@ -219,6 +230,19 @@ pub fn cpu_name() -> Option<String> {
     let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = info.lines().find_map(|line| line.strip_prefix("model name"))?;
     Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+/// How long something took, such as `12 ms`, `3.1 s`, `2 min 00 s`, `1 h 05 min`.
+pub fn seconds(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
+        s if s < 99.95 => format!("{s:.1} s"),
+        s => {
+            let whole = s.round() as u64;
+            let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
+            if hours > 0 { format!("{hours} h {minutes:02} min") } else { format!("{minutes} min {seconds:02} s") }
+        }
+    }
 }
 
 /// A time as `2026-01-31T23:59:59Z`.

@@ -150,7 +150,7 @@ impl Shared {
 
     /// The image as an earlier run left it, if that is what this run would write; else why not.
     pub fn kept(&self, task: usize, camera: usize, output: &Path) -> Result<ImageReport, Why> {
-        let json = self.path(output, "json");
+        let json = self.settings.path(output, "json");
         let Kept { report, outputs } = check(&json, &self.wanted(task, camera), &self.hashes)?;
         let path = |kind: &str| {
             let of_kind = outputs.iter().find(|path| path.extension().is_some_and(|e| e == kind));
@@ -162,14 +162,6 @@ impl Shared {
             outputs: Outputs { exr: path("exr"), png: path("png"), json: Some(json.display().to_string()) },
             ..report
         })
-    }
-
-    /// `<out>/<output>.<extension>`.
-    pub fn path(&self, output: &Path, extension: &str) -> PathBuf {
-        let mut name = self.settings.out.join(output).into_os_string();
-        name.push(".");
-        name.push(extension);
-        name.into()
     }
 
     fn gate(&self) -> MutexGuard<'_, Gate> {

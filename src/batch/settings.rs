@@ -9,7 +9,7 @@ use super::size::PictureSize;
 use super::view::CameraSource;
 use crate::load::LoadOptions;
 use crate::render::RenderSettings;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -69,5 +69,13 @@ impl BatchSettings {
     pub fn tasks_for(inputs: Vec<Input>, settings: FileSettings) -> Vec<Task> {
         let settings = Arc::new(settings);
         inputs.into_iter().map(|input| Task { input, settings: Arc::clone(&settings) }).collect()
+    }
+
+    /// `<out>/<output>.<extension>`.
+    pub(super) fn path(&self, output: &Path, extension: &str) -> PathBuf {
+        let mut name = self.out.join(output).into_os_string();
+        name.push(".");
+        name.push(extension);
+        name.into()
     }
 }

@@ -90,7 +90,7 @@ impl WriteStage {
             image.peak_rss_bytes = report::peak_rss_bytes();
         }
         if let (Some(output), Ok(())) = (&output, &written) {
-            let path = self.shared.path(output, "json");
+            let path = self.shared.settings.path(output, "json");
             image.outputs.json = Some(path.display().to_string());
             written = write_atomic(&path, report::to_json(&image).as_bytes());
         }
@@ -154,7 +154,7 @@ impl WriteStage {
         bytes: &[u8],
         fingerprint: &mut Option<Fingerprint>,
     ) -> Result<String, WriteError> {
-        let path = self.shared.path(output, extension);
+        let path = self.shared.settings.path(output, extension);
         // The report, which is written last and into the same folder, syncs the folder for all three.
         write_whole(&path, bytes)?;
         if let Some(fingerprint) = fingerprint {

@@ -88,7 +88,7 @@ const EMBREE_LIBRARY: u64 = 7 << 20;
 const THREAD: u64 = 1 << 20;
 
 /// Cores this process may use; asked once, as the answer takes reading half a dozen of the system's files.
-fn cores() -> usize {
+pub fn cores() -> usize {
     static CORES: OnceLock<usize> = OnceLock::new();
     *CORES.get_or_init(|| std::thread::available_parallelism().map_or(1, Into::into))
 }

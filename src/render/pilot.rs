@@ -65,13 +65,13 @@ pub fn pilot(prepared: &Prepared, camera: &Camera, settings: &RenderSettings) ->
                 break;
             }
             let unit = patch(i, window, side, samples);
-            let before = rays_of(&worker);
+            let before = worker.counters.total();
             let start = Instant::now();
             tracer.trace(&unit, &mut worker, &mut Nowhere);
             // What a thread traces first is slow: nothing is in its caches yet.
             if is_warm {
                 seconds += start.elapsed().as_secs_f64();
-                rays += rays_of(&worker) - before;
+                rays += worker.counters.total() - before;
                 paths += u64::from(unit.width) * u64::from(unit.height) * u64::from(samples);
             }
             is_warm = true;
@@ -83,10 +83,6 @@ pub fn pilot(prepared: &Prepared, camera: &Camera, settings: &RenderSettings) ->
     let all = f64::from(window.width) * f64::from(window.height) * f64::from(settings.spp);
     let threads = rayon::current_num_threads() as f64;
     Pilot { paths, rays, render_seconds: all * seconds / (paths.max(1) as f64 * threads) }
-}
-
-fn rays_of(worker: &Worker) -> u64 {
-    worker.counters.camera + worker.counters.bounce + worker.counters.shadow
 }
 
 /// Patch `i` of the picture: any number of them from 0 on are spread evenly.

@@ -4,17 +4,6 @@ use super::style::Paint;
 use super::text::{count, indented, mrays_per_s, printable, seconds};
 use prt::batch::report::{Accel, ImageReport, Status};
 
-/// As users read it.
-pub fn status_word(status: Status) -> &'static str {
-    match status {
-        Status::Rendered => "rendered",
-        Status::UpToDate => "up to date",
-        Status::Empty => "empty",
-        Status::Failed => "failed",
-        Status::Interrupted => "interrupted",
-    }
-}
-
 /// A name that no other image of the run has: its first output, else its input.
 pub fn name(image: &ImageReport) -> String {
     let outputs = [&image.outputs.exr, &image.outputs.png];
@@ -24,7 +13,7 @@ pub fn name(image: &ImageReport) -> String {
 /// `renders/cornell.exr  1280x720  64 spp  3.1 s  82 Mray/s`, or the name and what else came of it.
 pub fn line(image: &ImageReport, paint: Paint) -> String {
     if image.status != Status::Rendered {
-        return format!("{}: {}", name(image), paint.status(image.status, status_word(image.status)));
+        return format!("{}: {}", name(image), paint.status(image.status, image.status.word()));
     }
     // Without pictures the JSON is what came of it.
     let json = image.outputs.json.as_ref().filter(|_| image.outputs.exr.is_none() && image.outputs.png.is_none());

@@ -3,7 +3,7 @@
 use super::Verbosity;
 use super::bars::Look;
 use super::board::Board;
-use super::image_lines::{accel_line, details, line, status_word, strict_failure};
+use super::image_lines::{accel_line, details, line, strict_failure};
 use super::json_lines::{self, Event};
 use super::output::{self, error, interrupted, say, tell};
 use super::repeats::Repeats;
@@ -79,7 +79,7 @@ impl Reporter {
         }
         if self.says_results() && (report.images.len() > 1 || self.verbosity == Verbosity::Verbose) {
             let some = report.counts.iter().filter(|(_, count)| **count > 0);
-            let word = |status: Status| self.look.paint.status(status, status_word(status));
+            let word = |status: Status| self.look.paint.status(status, status.word());
             let list: Vec<_> = some.map(|(status, count)| format!("{count} {}", word(*status))).collect();
             say(&format!("{}, {}", list.join(", "), seconds(report.seconds)));
         }

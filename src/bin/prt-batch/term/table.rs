@@ -1,6 +1,6 @@
 //! The table at the end of a run of several images.
 
-use super::image_lines::{name, size, status_word};
+use super::image_lines::{name, size};
 use super::style::Paint;
 use super::text::{cut, mrays, pad_end, pad_start, printable, seconds, shorten, width};
 use prt::batch::report::{ImageReport, Status};
@@ -109,7 +109,7 @@ fn row(image: &ImageReport) -> [String; 8] {
         None | Some(()) => none(),
     };
     [
-        status_word(image.status).to_owned(),
+        image.status.word().to_owned(),
         name(image),
         size(image).unwrap_or_else(none),
         spp,

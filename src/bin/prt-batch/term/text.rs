@@ -1,5 +1,6 @@
 //! Numbers, durations and names as they are shown, and their width in columns of a terminal.
 
+pub use prt::batch::report::seconds;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Columns that `text` takes; it must not hold escape sequences.
@@ -60,19 +61,6 @@ pub fn indented(text: &str) -> String {
     let mut lines = text.lines();
     let first = lines.next().unwrap_or_default().to_owned();
     lines.fold(first, |all, next| all + "\n" + &line(next))
-}
-
-/// How long something took, such as `3.1 s`.
-pub fn seconds(seconds: f64) -> String {
-    match seconds {
-        s if s < 0.0995 => format!("{:.0} ms", s * 1e3),
-        s if s < 99.95 => format!("{s:.1} s"),
-        s if s < 3599.5 => {
-            let s = s.round() as u64;
-            format!("{} min {:02} s", s / 60, s % 60)
-        }
-        s => whole(s),
-    }
 }
 
 /// A duration that goes on, such as `9 s`, `1 min 03 s`, `44 min`, `2 h 05 min`.
