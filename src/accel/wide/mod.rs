@@ -10,16 +10,20 @@ mod leaf;
 mod node;
 mod packet;
 mod ray;
+mod source;
 mod traverse;
 mod validate;
 
-use super::{Accel, AccelStats, HitBatch, RayBatch, Triangles};
+use super::geometry::{Geometry, HitFilter};
+use super::{Accel, AccelStats, HitBatch, RayBatch};
 use node::{Leaves, Node};
 use simd::{Level, dispatch};
+use source::Source;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The tree, over all triangles but those of zero area.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct WideBvh {
     nodes: Vec<Node>,
     leaves: Leaves,
@@ -31,12 +35,14 @@ pub struct WideBvh {
     level: Level,
     /// For packets: any.
     packet_level: Level,
+    /// Decides about hits on filtered triangles.
+    filter: Option<Arc<dyn HitFilter>>,
 }
 
 impl WideBvh {
     /// Builds with the threads of rayon's current pool; the tree does not depend on how many they are.
-    pub fn build(triangles: &Triangles) -> Self {
-        Self::with_level(triangles, Level::best())
+    pub fn build(geometry: impl Into<Geometry>) -> Self {
+        Self::with_level(geometry, Level::best())
     }
 
     /// As [`WideBvh::build`], traced at `level`: camera rays in packets of its lanes, single rays at the nearest level
@@ -44,7 +50,9 @@ impl WideBvh {
     ///
     /// # Panics
     /// When this CPU does not have the level.
-    pub fn with_level(triangles: &Triangles, level: Level) -> Self {
+    pub fn with_level(geometry: impl Into<Geometry>, level: Level) -> Self {
+        let geometry = geometry.into();
+        let triangles = &Source::new(&geometry.world.parts);
         // AVX-512 gives single rays nothing: in Embree 4.4 AVX2 is as fast or up to 1.14 times faster.
         let packet_level = level;
         let level = match level {
@@ -60,12 +68,12 @@ impl WideBvh {
         });
         let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
-        Self { nodes, leaves, depth, bounds, level, packet_level }
+        Self { nodes, leaves, depth, bounds, level, packet_level, filter: geometry.filter }
     }
 
-    /// What is wrong with the tree over `triangles`, if anything: for tests.
-    pub fn validate(&self, triangles: &Triangles) -> Result<(), String> {
-        validate::validate(self, triangles)
+    /// What is wrong with the tree over `geometry`, if anything: for tests.
+    pub fn validate(&self, geometry: impl Into<Geometry>) -> Result<(), String> {
+        validate::validate(self, &Source::new(&geometry.into().world.parts))
     }
 
     /// A hash of everything in the tree, for tests of determinism.

@@ -6,6 +6,9 @@ pub const WIDTH: usize = 8;
 /// Rows of a leaf: three corners of three coordinates, then the triangles' indices.
 pub const LEAF_ROWS: usize = 10;
 
+/// Set in a leaf's primitive number where the geometry's filter decides about hits.
+pub const FILTERED: u32 = 1 << 31;
+
 /// A node: the boxes of its children, as rows, and where they are. Four cache lines, nothing quantised: decoding 8-bit
 /// boxes at every node halves the speed of incoherent rays on a CPU.
 #[derive(Clone, Copy, Debug)]
@@ -113,9 +116,9 @@ impl Leaves {
         leaf.first() * LEAF_ROWS
     }
 
-    /// Index of triangle `i` of `leaf` among the triangles that the tree was built from.
+    /// Primitive number of triangle `i` of `leaf`, and [`FILTERED`] where that applies.
     #[inline(always)]
-    pub fn primitive(&self, leaf: Child, i: usize) -> u32 {
+    pub fn word(&self, leaf: Child, i: usize) -> u32 {
         self.data[Self::offset(leaf) + (LEAF_ROWS - 1) * leaf.count() + i].to_bits()
     }
 }

@@ -1,14 +1,14 @@
 //! Checks of a finished tree, for tests and debug builds.
 
 use super::WideBvh;
-use super::node::{Child, Node, WIDTH};
-use crate::accel::Triangles;
+use super::node::{Child, FILTERED, Node, WIDTH};
+use super::source::Source;
 use crate::accel::woop::can_be_hit;
 
 /// What is wrong with the tree, if anything: every triangle that can be hit is in exactly one leaf, every box contains
 /// what lies below it, and the depth is the stated one.
-pub fn validate(bvh: &WideBvh, triangles: &Triangles) -> Result<(), String> {
-    let mut seen = vec![0u32; triangles.indices.len()];
+pub fn validate(bvh: &WideBvh, triangles: &Source<'_>) -> Result<(), String> {
+    let mut seen = vec![0u32; triangles.len()];
     let depth = visit(bvh, triangles, &mut seen, 0, [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]])?;
     if depth != bvh.depth {
         return Err(format!("depth is {depth}, not {}", bvh.depth));
@@ -25,7 +25,7 @@ pub fn validate(bvh: &WideBvh, triangles: &Triangles) -> Result<(), String> {
 /// Depth of the subtree at `node`, which must lie in `outer`.
 fn visit(
     bvh: &WideBvh,
-    triangles: &Triangles,
+    triangles: &Source<'_>,
     seen: &mut [u32],
     node: usize,
     outer: [[f32; 3]; 2],
@@ -49,13 +49,13 @@ fn visit(
 
 fn visit_leaf(
     bvh: &WideBvh,
-    triangles: &Triangles,
+    triangles: &Source<'_>,
     seen: &mut [u32],
     leaf: Child,
     bounds: [[f32; 3]; 2],
 ) -> Result<(), String> {
     for i in 0..leaf.count() {
-        let primitive = bvh.leaves.primitive(leaf, i) as usize;
+        let primitive = (bvh.leaves.word(leaf, i) & !FILTERED) as usize;
         *seen.get_mut(primitive).ok_or(format!("{leaf:?} names triangle {primitive}"))? += 1;
         let corners = triangles.corners(primitive).map(|corner| corner.to_array());
         if let Some(corner) = corners.into_iter().find(|&corner| !contains(bounds, corner)) {
