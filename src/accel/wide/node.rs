@@ -48,7 +48,8 @@ impl Node {
     }
 }
 
-/// Where a child is. Inner: index of a node, bit 31 clear. Leaf: bit 31 set, triangles - 1 in bits 28 to 30, index of
+/// Where a child is. Inner: index of a node, bits 30 and 31 clear. Special: bit 31 clear, bit 30 set, index of a box in
+/// bits 0 to 29. Leaf: bit 31 set, triangles - 1 in bits 28 to 30, index of
 /// the first triangle in leaf order in bits 0 to 27.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
@@ -60,8 +61,14 @@ impl Child {
 
     /// An inner node.
     pub const fn inner(node: usize) -> Self {
-        debug_assert!(node < 1 << 31);
+        debug_assert!(node < 1 << 30);
         Self(node as u32)
+    }
+
+    /// Something else than triangles, by its number among the boxes that the tree was built from.
+    pub const fn special(index: usize) -> Self {
+        debug_assert!(index < 1 << 30);
+        Self(1 << 30 | index as u32)
     }
 
     /// `count` triangles, 1 to 8, from `first` on.
@@ -79,6 +86,18 @@ impl Child {
     #[inline(always)]
     pub const fn is_leaf(self) -> bool {
         self.0 >> 31 == 1
+    }
+
+    /// Whether it is an inner node.
+    #[inline(always)]
+    pub const fn is_inner(self) -> bool {
+        self.0 >> 30 == 0
+    }
+
+    /// Number of a box.
+    #[inline(always)]
+    pub const fn index(self) -> usize {
+        self.0 as usize & ((1 << 30) - 1)
     }
 
     /// Index of an inner node.

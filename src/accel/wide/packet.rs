@@ -58,7 +58,7 @@ impl Kernel for IntersectPackets<'_> {
         let last = (range.end / L::N * L::N).max(first);
         remaining.extend([range.start..first, last..range.end]);
         for at in (first..last).step_by(L::N) {
-            let packet = RayLanes::<L>::new(rays, at, &bvh.bounds);
+            let packet = RayLanes::<L>::new(rays, at, &bvh.world.bounds);
             if !packet.is_uniform(packet.valid) {
                 remaining.push(at..at + L::N);
                 continue;
@@ -106,7 +106,7 @@ fn intersect_packet<L: Lanes>(
             end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
             continue;
         }
-        let node = &bvh.nodes[child.node()];
+        let node = &bvh.world.nodes[child.node()];
         let base = len;
         for i in 0..(node.count as usize).min(node.children.len()) {
             let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
@@ -140,7 +140,7 @@ fn intersect_leaf<L: Lanes>(
     nearest: &mut NearestLanes<L>,
 ) {
     let n = leaf.count();
-    let rows = &bvh.leaves.data[Leaves::offset(leaf)..][..LEAF_ROWS * n];
+    let rows = &bvh.world.leaves.data[Leaves::offset(leaf)..][..LEAF_ROWS * n];
     for i in 0..n {
         let a = corner::<L>(rows, i, n, packet, shape);
         let b = corner::<L>(rows, 3 * n + i, n, packet, shape);

@@ -81,13 +81,13 @@ impl Kernel for Intersect<'_> {
             return;
         }
         let mut stack = Stack::new();
-        let mut lanes = RayLanes::<L>::new(rays, range.start / WIDTH * WIDTH, &bvh.bounds);
+        let mut lanes = RayLanes::<L>::new(rays, range.start / WIDTH * WIDTH, &bvh.world.bounds);
         let mut stored = [[0.0; WIDTH]; 18];
         lanes.store(&mut stored);
         for i in range {
             let lane = i % WIDTH;
             if lane == 0 {
-                lanes = RayLanes::new(rays, i, &bvh.bounds);
+                lanes = RayLanes::new(rays, i, &bvh.world.bounds);
                 lanes.store(&mut stored);
             }
             let mut nearest = Nearest { t: rays.t_max[i], u: 0.0, v: 0.0, primitive: MISS };
@@ -116,7 +116,7 @@ fn intersect_one<L: Lanes>(
     let mut child = Child::inner(0);
     loop {
         while !child.is_leaf() {
-            let node = &bvh.nodes[child.node()];
+            let node = &bvh.world.nodes[child.node()];
             let (mut bits, enter) = ray.test_boxes(&node.planes, L::F::splat(end));
             if bits == 0 {
                 break;
@@ -144,7 +144,7 @@ fn intersect_one<L: Lanes>(
             }
             child = first.child;
         }
-        if child.is_leaf() && leaf::intersect(&bvh.leaves, child, ray, asked, nearest) {
+        if child.is_leaf() && leaf::intersect(&bvh.world.leaves, child, ray, asked, nearest) {
             end = box_end(nearest.t);
         }
         child = loop {
@@ -183,13 +183,13 @@ impl Kernel for Occluded<'_> {
             return;
         }
         let mut stack = Stack::new();
-        let mut lanes = RayLanes::<L>::new(self.rays, 0, &self.bvh.bounds);
+        let mut lanes = RayLanes::<L>::new(self.rays, 0, &self.bvh.world.bounds);
         let mut stored = [[0.0; WIDTH]; 18];
         lanes.store(&mut stored);
         for (i, out) in self.occluded[..self.n].iter_mut().enumerate() {
             let lane = i % WIDTH;
             if lane == 0 {
-                lanes = RayLanes::new(self.rays, i, &self.bvh.bounds);
+                lanes = RayLanes::new(self.rays, i, &self.bvh.world.bounds);
                 lanes.store(&mut stored);
             }
             *out = 0;
@@ -209,11 +209,11 @@ fn occluded_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, asked: &Asked<'_>, 
     let mut child = Child::inner(0);
     loop {
         if child.is_leaf() {
-            if leaf::occluded(&bvh.leaves, child, ray, asked, t_max) {
+            if leaf::occluded(&bvh.world.leaves, child, ray, asked, t_max) {
                 return true;
             }
         } else {
-            let node = &bvh.nodes[child.node()];
+            let node = &bvh.world.nodes[child.node()];
             let (mut bits, _) = ray.test_boxes(&node.planes, end);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize % WIDTH;
