@@ -145,7 +145,12 @@ impl Placement {
 
     /// The map at `time` in [0, 1].
     pub fn at(&self, time: f32) -> Affine {
-        match &self.keys[..] {
+        Self::map_at(&self.keys, time)
+    }
+
+    /// The map of `keys` (at least one) at `time` in [0, 1].
+    pub fn map_at(keys: &[Affine], time: f32) -> Affine {
+        match keys {
             [only] => *only,
             keys => {
                 let (k, s) = segment(keys.len(), time);

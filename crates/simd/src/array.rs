@@ -149,6 +149,16 @@ impl<const K: usize> Float for F<K> {
     }
 
     #[inline(always)]
+    fn permute(self, by: U<K>) -> Self {
+        Self(from_fn(|i| self.0[by.0[i] as usize % K]))
+    }
+
+    #[inline(always)]
+    fn first(self) -> f32 {
+        self.0[0]
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         self * b + c
     }
@@ -232,6 +242,11 @@ impl<const K: usize> Uint for U<K> {
     #[inline(always)]
     fn compress(self, keep: M<K>, dst: &mut [u32], at: usize) {
         compress(self.0, keep, dst, at);
+    }
+
+    #[inline(always)]
+    fn permute(self, by: Self) -> Self {
+        Self(from_fn(|i| self.0[by.0[i] as usize % K]))
     }
 
     #[inline(always)]

@@ -247,6 +247,18 @@ impl Float for F {
     }
 
     #[inline(always)]
+    fn permute(self, by: U) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm256_permutevar8x32_ps(self.0, by.0)) }
+    }
+
+    #[inline(always)]
+    fn first(self) -> f32 {
+        // SAFETY: see the head of this file.
+        unsafe { _mm256_cvtss_f32(self.0) }
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm256_fmadd_ps(self.0, b.0, c.0)) }
@@ -347,6 +359,12 @@ impl Uint for U {
     fn compress(self, keep: M, dst: &mut [u32], at: usize) {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm256_permutevar8x32_epi32(self.0, packing(keep))) }.store(dst, at);
+    }
+
+    #[inline(always)]
+    fn permute(self, by: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm256_permutevar8x32_epi32(self.0, by.0)) }
     }
 
     #[inline(always)]

@@ -213,6 +213,18 @@ impl Float for F {
     }
 
     #[inline(always)]
+    fn permute(self, by: U) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_permutexvar_ps(by.0, self.0)) }
+    }
+
+    #[inline(always)]
+    fn first(self) -> f32 {
+        // SAFETY: see the head of this file.
+        unsafe { _mm512_cvtss_f32(self.0) }
+    }
+
+    #[inline(always)]
     fn mul_add(self, b: Self, c: Self) -> Self {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm512_fmadd_ps(self.0, b.0, c.0)) }
@@ -313,6 +325,12 @@ impl Uint for U {
     fn compress(self, keep: M, dst: &mut [u32], at: usize) {
         // SAFETY: see the head of this file.
         unsafe { Self(_mm512_maskz_compress_epi32(keep.0, self.0)) }.store(dst, at);
+    }
+
+    #[inline(always)]
+    fn permute(self, by: Self) -> Self {
+        // SAFETY: see the head of this file.
+        unsafe { Self(_mm512_permutexvar_epi32(by.0, self.0)) }
     }
 
     #[inline(always)]

@@ -57,6 +57,10 @@ pub trait Float:
     fn store(self, dst: &mut [f32], at: usize);
     /// The lanes that are `keep`, packed to the front, then unspecified values, into `dst[at..at + N]`.
     fn compress(self, keep: Self::M, dst: &mut [f32], at: usize);
+    /// Lane i from lane `by[i] % N`.
+    fn permute(self, by: Self::U) -> Self;
+    /// Lane 0.
+    fn first(self) -> f32;
     /// `self * b + c`, fused where the level has it (AVX2 and up), else with two roundings.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// The smaller; the second operand if either is NaN.
@@ -155,6 +159,8 @@ pub trait Uint:
     fn store(self, dst: &mut [u32], at: usize);
     /// The lanes that are `keep`, packed to the front, then unspecified values, into `dst[at..at + N]`.
     fn compress(self, keep: Self::M, dst: &mut [u32], at: usize);
+    /// Lane i from lane `by[i] % N`.
+    fn permute(self, by: Self) -> Self;
     /// Shifted left; `by` < 32.
     fn shl(self, by: u32) -> Self;
     /// Shifted right; `by` < 32.

@@ -19,7 +19,9 @@ mod avx512;
 mod buffer;
 mod lanes;
 mod level;
+mod prefetch;
 
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
 pub use level::{Kernel, Level, dispatch, dispatch_large};
+pub use prefetch::prefetch;

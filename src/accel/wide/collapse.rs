@@ -97,6 +97,7 @@ impl Writer<'_> {
             let Bounds { low, high } = binary.bounds;
             node.push([low.x, low.y, low.z], [high.x, high.y, high.z], word);
         }
+        node.sort();
         self.nodes[at] = node;
         at
     }

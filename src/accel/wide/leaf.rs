@@ -13,7 +13,23 @@ pub struct Nearest {
     pub t: f32,
     pub u: f32,
     pub v: f32,
+    pub instance: u32,
     pub primitive: u32,
+}
+
+impl Nearest {
+    /// No hit before `t_max`.
+    #[inline(always)]
+    pub const fn none(t_max: f32) -> Self {
+        Self { t: t_max, u: 0.0, v: 0.0, instance: 0, primitive: MISS }
+    }
+
+    /// Whether a hit is nearer, or as near with lower numbers. At the ray's end there is none.
+    #[inline(always)]
+    pub fn yields_to(&self, t: f32, instance: u32, primitive: u32) -> bool {
+        t < self.t
+            || t == self.t && self.primitive != MISS && (instance, primitive) < (self.instance, self.primitive)
+    }
 }
 
 /// Who is asked about hits on filtered triangles, and for which ray.
@@ -130,9 +146,9 @@ pub fn intersect<L: Lanes>(
         bits &= bits - 1;
         let word = leaves.word(leaf, i);
         let primitive = word & !FILTERED;
-        let tie = found.t[i] == nearest.t && nearest.primitive != MISS && primitive < nearest.primitive;
-        if (found.t[i] < nearest.t || tie) && !asked.passes(word, found.u[i], found.v[i]) {
-            *nearest = Nearest { t: found.t[i], u: found.u[i], v: found.v[i], primitive };
+        let (t, instance) = (found.t[i], asked.instance);
+        if nearest.yields_to(t, instance, primitive) && !asked.passes(word, found.u[i], found.v[i]) {
+            *nearest = Nearest { t, u: found.u[i], v: found.v[i], instance, primitive };
             changed = true;
         }
     }

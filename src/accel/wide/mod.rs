@@ -43,7 +43,9 @@ impl Tree {
         });
         let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
-        Self { nodes, leaves, depth, bounds }
+        let mut tree = Self { nodes, leaves, depth, bounds };
+        traverse::mark(&mut tree);
+        tree
     }
 
     /// Bytes held.
@@ -100,7 +102,7 @@ impl WideBvh {
         // FNV-1a, 32 bits at a time.
         let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0000_0100_0000_01b3);
         let planes = self.world.nodes.iter().flat_map(|node| node.planes.iter().map(|plane| plane.to_bits()));
-        let children = self.world.nodes.iter().flat_map(|node| node.children.iter().map(|child| child.bits()));
+        let children = self.world.nodes.iter().flat_map(|node| node.children.iter().copied().chain(node.order));
         let leaves = self.world.leaves.data.iter().map(|word| word.to_bits());
         planes.chain(children).chain(leaves).fold(0xcbf2_9ce4_8422_2325, mix)
     }

@@ -106,9 +106,9 @@ fn intersect_packet<L: Lanes>(
             end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
             continue;
         }
-        let node = &bvh.world.nodes[child.node()];
+        let node = &bvh.world.nodes[child.node() & ((1 << 29) - 1)];
         let base = len;
-        for i in 0..(node.count as usize).min(node.children.len()) {
+        for i in 0..node.count() {
             let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
             if bits == 0 {
                 continue;
@@ -116,7 +116,7 @@ fn intersect_packet<L: Lanes>(
             debug_assert!(len < STACK);
             let entry = &mut stack[len % STACK];
             enter.or_else(L::M::from_bits(bits), L::F::splat(f32::INFINITY)).store(&mut entry.enter, 0);
-            entry.child = node.children[i];
+            entry.child = node.child(i % 8);
             entry.first = entry.enter[bits.trailing_zeros() as usize % MAX_LANES];
             // Sink it, so that the nearest ends on top.
             let mut j = len;

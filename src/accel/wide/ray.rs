@@ -23,9 +23,9 @@ const PARALLEL_SLOPE: f32 = 2.0 * WIDEN;
 const PARALLEL_PAD: f32 = 8.0 * WIDEN;
 /// Share of the origin's coordinate lost in `plane * inverse - origin * inverse`: 4 eps (2, and 1 without FMA).
 const ORIGIN_PAD: f32 = WIDEN / 2.0;
-/// By how much boxes beyond the nearest hit may lie and still be entered: 32 eps, for the rounding of t and of the
-/// slabs, so that a triangle with an equal t is always found.
-const BEHIND: f32 = 4.0 * WIDEN;
+/// By how much boxes beyond the nearest hit may lie and still be entered: 32 eps for the rounding of t and of the
+/// slabs and 16 for the lane's number in the last bits of where a box is entered, so that a triangle with an equal t is always found.
+const BEHIND: f32 = 6.0 * WIDEN;
 
 /// Rays of a batch prepared for nodes and leaves, one in every lane. `woop::ShearedRay` says what the last four are.
 ///
@@ -54,12 +54,17 @@ pub struct RayLanes<L: Lanes> {
 }
 
 impl<L: Lanes> RayLanes<L> {
-    /// Rays `at..at + L::N`; `at` is a multiple of `L::N`. `scene` are the corners of the scene's bounds.
+    /// Rays `at..at + L::N`, which the batch must have room for. `scene` are the corners of the scene's bounds.
     #[inline(always)]
     pub fn new(rays: &RayBatch, at: usize, scene: &[[f32; 3]; 2]) -> Self {
         let o = [L::F::load(&rays.ox, at), L::F::load(&rays.oy, at), L::F::load(&rays.oz, at)];
         let d = [L::F::load(&rays.dx, at), L::F::load(&rays.dy, at), L::F::load(&rays.dz, at)];
-        let t_max = L::F::load(&rays.t_max, at);
+        Self::of(o, d, L::F::load(&rays.t_max, at), scene)
+    }
+
+    /// Rays by origin, direction and end.
+    #[inline(always)]
+    pub fn of(o: [L::F; 3], d: [L::F; 3], t_max: L::F, scene: &[[f32; 3]; 2]) -> Self {
         let zero = L::F::zero();
         let a = [d[0].abs(), d[1].abs(), d[2].abs()];
         // 0 * x is NaN for infinities and NaN. A NaN end fails its comparison.
@@ -198,6 +203,14 @@ pub struct Shape {
     pub axes: [usize; 3],
 }
 
+impl Shape {
+    /// Where the octant's bits begin in the nodes' orders.
+    #[inline(always)]
+    pub fn octant(&self) -> u32 {
+        3 * (u32::from(self.down[0]) + 2 * u32::from(self.down[1]) + 4 * u32::from(self.down[2]))
+    }
+}
+
 /// One ray, in every lane.
 #[derive(Clone, Copy)]
 pub struct SingleRay<L: Lanes> {
@@ -233,9 +246,21 @@ impl<L: Lanes> SingleRay<L> {
         }
     }
 
-    /// Which of a node's boxes the ray meets in [0, `end`], as bits, and where it enters them. As [`RayLanes::test_box`].
+    /// The ray that all lanes of `lanes` are.
     #[inline(always)]
-    pub fn test_boxes(&self, planes: &[f32; 6 * WIDTH], end: L::F) -> (u32, L::F) {
+    pub fn of_lanes(lanes: &RayLanes<L>, shape: Shape) -> Self {
+        let (mut near_rows, mut far_rows) = ([0; 3], [0; 3]);
+        for axis in 0..3 {
+            (near_rows[axis], far_rows[axis]) = rows(axis, shape.down[axis]);
+        }
+        let RayLanes { near_inverse, near_start, far_inverse, far_start, origin, shear, .. } = *lanes;
+        let axes = shape.axes;
+        Self { near_rows, far_rows, near_inverse, near_start, far_inverse, far_start, axes, origin, shear }
+    }
+
+    /// Which of a node's boxes the ray meets in [0, `end`], and where it enters them. As [`RayLanes::test_box`].
+    #[inline(always)]
+    pub fn test_boxes(&self, planes: &[f32; 6 * WIDTH], end: L::F) -> (L::M, L::F) {
         let (mut enter, mut exit) = (L::F::zero(), end);
         for axis in 0..3 {
             let near = L::F::load(planes, self.near_rows[axis]);
@@ -243,7 +268,7 @@ impl<L: Lanes> SingleRay<L> {
             enter = near.mul_add(self.near_inverse[axis], self.near_start[axis]).max(enter);
             exit = far.mul_add(self.far_inverse[axis], self.far_start[axis]).min(exit);
         }
-        (enter.le(exit).bits(), enter)
+        (enter.le(exit), enter)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Checks of a finished tree, for tests and debug builds.
 
 use super::Tree;
-use super::node::{Child, FILTERED, Node, WIDTH};
+use super::node::{Child, FILTERED, WIDTH};
 use super::source::Source;
 use crate::accel::woop::can_be_hit;
 
@@ -30,9 +30,11 @@ fn visit(
     node: usize,
     outer: [[f32; 3]; 2],
 ) -> Result<usize, String> {
-    let Node { planes, children, count } = &tree.nodes[node];
+    let node_ref = &tree.nodes[node];
+    let planes = &node_ref.planes;
     let mut depth = 0;
-    for (lane, &child) in children[..*count as usize].iter().enumerate() {
+    for lane in 0..node_ref.count() {
+        let child = node_ref.child(lane);
         let corner = |row: usize| [0, 1, 2].map(|axis| planes[(row + axis) * WIDTH + lane]);
         let bounds = [corner(0), corner(3)];
         if !contains(outer, bounds[0]) || !contains(outer, bounds[1]) {
