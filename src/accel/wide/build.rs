@@ -7,7 +7,7 @@
 //! both halves can be built in parallel and the result is the same however many threads there are.
 
 use super::collapse::{Costs, combine, leaf_cost};
-use super::node::Child;
+use super::node::{Child, WIDTH};
 use super::source::Source;
 use crate::accel::woop::can_be_hit;
 use glam::{Vec3, Vec4, Vec4Swizzles};
@@ -17,7 +17,7 @@ use rayon::prelude::*;
 const BINS: usize = 16;
 /// Levels of the binary tree at most: the stack of the traversal is sized by this.
 pub const MAX_DEPTH: u32 = 64;
-/// Splitting stops here; the collapse decides how many of these share a leaf.
+/// Triangles: splitting stops here; the collapse decides how many of these share a leaf.
 const SMALL: usize = 2;
 /// Subtrees below this many primitives are built by one thread.
 const PARALLEL: usize = 4096;
@@ -40,16 +40,25 @@ impl Reference {
         if !can_be_hit([a, b, c]) {
             return None;
         }
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        Some(Self::padded(a.min(b).min(c), a.max(b).max(c), i))
+    }
+
+    /// The box of index `i`, padded likewise; `None` if it is empty or NaN.
+    fn of_box([low, high]: [Vec3; 2], i: usize) -> Option<Self> {
+        low.cmple(high).all().then(|| Self::padded(low, high, i))
+    }
+
+    #[inline(always)]
+    fn padded(low: Vec3, high: Vec3, i: usize) -> Self {
         let pad = (high - low).max_element() * 2f32.powi(-20);
         let low = (low - pad).to_array().map(f32::next_down);
         let high = (high + pad).to_array().map(f32::next_up);
         // Exponents 0x80 to 0x9f: a normal number, so that min, max and sums of w cost nothing and trap nothing.
         let tag = f32::from_bits(i as u32 | 1 << 30);
-        Some(Self { low: Vec3::from(low).extend(tag), high: Vec3::from(high).extend(0.0) })
+        Self { low: Vec3::from(low).extend(tag), high: Vec3::from(high).extend(0.0) }
     }
 
-    /// Index of the triangle in the source.
+    /// Index of the triangle or box in the source.
     pub fn primitive(&self) -> u32 {
         self.low.w.to_bits() & !(1 << 30)
     }
@@ -112,6 +121,8 @@ pub struct BinaryTree {
     pub nodes: Vec<Binary>,
     /// In the order of the leaves.
     pub references: Vec<Reference>,
+    /// References that may share a leaf: 8 triangles, 1 box.
+    pub leaf_size: usize,
 }
 
 impl BinaryTree {
@@ -119,24 +130,37 @@ impl BinaryTree {
     pub fn build(triangles: &Source<'_>) -> Self {
         let n = triangles.len();
         assert!(n < Child::MAX_TRIANGLES, "the bvh holds up to 2^28 triangles, not {n}");
-        let mut references: Vec<_> =
+        let references =
             (0..n).into_par_iter().with_min_len(PARALLEL).filter_map(|i| Reference::new(triangles, i)).collect();
+        Self::over(references, WIDTH)
+    }
+
+    /// The tree over the boxes that are not empty, each in a leaf of its own.
+    pub fn of_boxes(boxes: &[Option<[Vec3; 2]>]) -> Self {
+        let n = boxes.len();
+        assert!(n <= Child::MAX_BOXES, "the bvh holds up to 2^30 boxes, not {n}");
+        let references = boxes.iter().enumerate().filter_map(|(i, b)| Reference::of_box((*b)?, i)).collect();
+        Self::over(references, 1)
+    }
+
+    fn over(mut references: Vec<Reference>, leaf_size: usize) -> Self {
         if references.is_empty() {
-            return Self { nodes: Vec::new(), references };
+            return Self { nodes: Vec::new(), references, leaf_size };
         }
         let mut nodes = vec![Binary::UNUSED; 2 * references.len() - 1];
-        subdivide(&mut nodes, &mut references, 0, 0);
-        Self { nodes, references }
+        subdivide(&mut nodes, &mut references, 0, 0, leaf_size);
+        Self { nodes, references, leaf_size }
     }
 }
 
 /// Builds the subtree over `references` into `nodes`.
-fn subdivide(nodes: &mut [Binary], references: &mut [Reference], first: usize, depth: u32) {
+fn subdivide(nodes: &mut [Binary], references: &mut [Reference], first: usize, depth: u32, leaf_size: usize) {
     let n = references.len();
     debug_assert_eq!(nodes.len(), 2 * n - 1);
     let (bounds, centres) = extents(references);
-    let mut node = Binary { bounds, first: first as u32, count: n as u32, right: 0, costs: [leaf_cost(&bounds, n); 7] };
-    if n > SMALL {
+    let mut node =
+        Binary { bounds, first: first as u32, count: n as u32, right: 0, costs: [leaf_cost(&bounds, n, leaf_size); 7] };
+    if n > SMALL.min(leaf_size) {
         let mid = split(references, &centres, depth);
         debug_assert!(0 < mid && mid < n);
         let (head, rest) = nodes.split_first_mut().expect("a subtree has at least one slot");
@@ -144,15 +168,15 @@ fn subdivide(nodes: &mut [Binary], references: &mut [Reference], first: usize, d
         let (left_refs, right_refs) = references.split_at_mut(mid);
         if n >= PARALLEL {
             rayon::join(
-                || subdivide(left, left_refs, first, depth + 1),
-                || subdivide(right, right_refs, first + mid, depth + 1),
+                || subdivide(left, left_refs, first, depth + 1, leaf_size),
+                || subdivide(right, right_refs, first + mid, depth + 1, leaf_size),
             );
         } else {
-            subdivide(left, left_refs, first, depth + 1);
-            subdivide(right, right_refs, first + mid, depth + 1);
+            subdivide(left, left_refs, first, depth + 1, leaf_size);
+            subdivide(right, right_refs, first + mid, depth + 1, leaf_size);
         }
         node.right = 2 * mid as u32;
-        node.costs = combine(&bounds, n, &left[0].costs, &right[0].costs);
+        node.costs = combine(&bounds, leaf_cost(&bounds, n, leaf_size), &left[0].costs, &right[0].costs);
         *head = node;
     } else {
         nodes[0] = node;

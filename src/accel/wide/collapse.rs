@@ -17,17 +17,18 @@ const NODE_COST: f32 = 1.0;
 const LEAF_COST: f32 = 0.7;
 const TRIANGLE_COST: f32 = 0.1;
 
-/// Cost of `n` triangles as a leaf.
-pub fn leaf_cost(bounds: &Bounds, n: usize) -> f32 {
-    if n <= WIDTH { bounds.half_area() * (LEAF_COST + TRIANGLE_COST * n as f32) } else { f32::INFINITY }
+/// Cost of `n` triangles as a leaf, where up to `most` may share one. What a box costs is the same however they are put
+/// together, so boxes take these costs too.
+pub fn leaf_cost(bounds: &Bounds, n: usize, most: usize) -> f32 {
+    if n <= most { bounds.half_area() * (LEAF_COST + TRIANGLE_COST * n as f32) } else { f32::INFINITY }
 }
 
-/// Costs of a binary node from those of its children.
-pub fn combine(bounds: &Bounds, n: usize, left: &Costs, right: &Costs) -> Costs {
+/// Costs of a binary node from its cost `as_leaf` and those of its children.
+pub fn combine(bounds: &Bounds, as_leaf: f32, left: &Costs, right: &Costs) -> Costs {
     // More lanes never cost more, so lanes are always handed out completely.
     let shared = |lanes: usize| (1..lanes).map(|k| left[k - 1] + right[lanes - k - 1]).fold(f32::INFINITY, f32::min);
     let node = bounds.half_area() * NODE_COST + shared_by_all(left, right);
-    let one = leaf_cost(bounds, n).min(node);
+    let one = as_leaf.min(node);
     let mut costs = [one; WIDTH - 1];
     for (i, cost) in costs.iter_mut().enumerate().skip(1) {
         *cost = one.min(shared(i + 1));
@@ -47,16 +48,12 @@ pub struct Collapsed {
     pub depth: usize,
 }
 
-/// Collapses `tree`. Nodes come in depth-first order.
-pub fn collapse(tree: &BinaryTree, triangles: &Source<'_>) -> Collapsed {
+/// Collapses `tree`, which is over `triangles` or, without them, over boxes. Nodes come in depth-first order.
+pub fn collapse(tree: &BinaryTree, triangles: Option<&Source<'_>>) -> Collapsed {
     let n = tree.references.len();
-    let mut out = Writer {
-        tree,
-        triangles,
-        nodes: Vec::with_capacity(n / 4 + 1),
-        data: Vec::with_capacity((n + 1) * LEAF_ROWS + WIDTH),
-        depth: 1,
-    };
+    let numbers = if triangles.is_some() { (n + 1) * LEAF_ROWS } else { LEAF_ROWS };
+    let nodes = Vec::with_capacity(n / 4 + 1);
+    let mut out = Writer { tree, triangles, nodes, data: Vec::with_capacity(numbers + WIDTH), depth: 1 };
     // Leaf 0 is one triangle of NaN: what the unused lanes lead to.
     out.data.resize(LEAF_ROWS - 1, f32::NAN);
     out.data.push(f32::from_bits(u32::MAX));
@@ -71,7 +68,7 @@ pub fn collapse(tree: &BinaryTree, triangles: &Source<'_>) -> Collapsed {
 
 struct Writer<'a> {
     tree: &'a BinaryTree,
-    triangles: &'a Source<'a>,
+    triangles: Option<&'a Source<'a>>,
     nodes: Vec<Node>,
     data: Vec<f32>,
     depth: usize,
@@ -104,8 +101,9 @@ impl Writer<'_> {
 
     /// Whether a leaf is the cheapest form of a binary node.
     fn is_leaf(&self, node: &Binary) -> bool {
-        node.right == 0
-            || (node.count as usize <= WIDTH && leaf_cost(&node.bounds, node.count as usize) <= node.costs[0])
+        // Costs may overflow: then it is the count that decides.
+        let (n, most) = (node.count as usize, self.tree.leaf_size);
+        node.right == 0 || (n <= most && leaf_cost(&node.bounds, n, most) <= node.costs[0])
     }
 
     /// Hands `lanes` lanes to the children of binary node `i`.
@@ -133,14 +131,15 @@ impl Writer<'_> {
     fn leaf(&mut self, node: &Binary) -> Child {
         let (first, count) = (node.first as usize, node.count as usize);
         let references = &self.tree.references[first..first + count];
+        let Some(triangles) = self.triangles else { return Child::special(references[0].primitive() as usize) };
         let at = self.data.len() / LEAF_ROWS;
         let primitives = || references.iter().map(|r| r.primitive());
         for corner in 0..3 {
             for axis in 0..3 {
-                self.data.extend(primitives().map(|p| self.triangles.corners(p as usize)[corner][axis]));
+                self.data.extend(primitives().map(|p| triangles.corners(p as usize)[corner][axis]));
             }
         }
-        self.data.extend(primitives().map(|p| f32::from_bits(self.triangles.word(p as usize))));
+        self.data.extend(primitives().map(|p| f32::from_bits(triangles.word(p as usize))));
         Child::leaf(at, count)
     }
 }

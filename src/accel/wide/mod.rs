@@ -36,12 +36,22 @@ struct Tree {
 impl Tree {
     /// The tree over `triangles`.
     fn of_triangles(triangles: &Source<'_>) -> Self {
-        let tree = build::BinaryTree::build(triangles);
+        Self::new(&build::BinaryTree::build(triangles), Some(triangles))
+    }
+
+    /// The tree over `boxes` (low and high corner): each is a child of its own, [`node::Child::special`] of its index.
+    /// Boxes that are `None`, empty or NaN are left out.
+    #[allow(dead_code, reason = "for placements and shapes, which come next")]
+    fn of_boxes(boxes: &[Option<[glam::Vec3; 2]>]) -> Self {
+        Self::new(&build::BinaryTree::of_boxes(boxes), None)
+    }
+
+    fn new(tree: &build::BinaryTree, triangles: Option<&Source<'_>>) -> Self {
         let bounds = tree.nodes.first().map_or([[0.0; 3]; 2], |root| {
             let corner = |v: glam::Vec4| [v.x, v.y, v.z];
             [corner(root.bounds.low), corner(root.bounds.high)]
         });
-        let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
+        let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
         let mut tree = Self { nodes, leaves, depth, bounds };
         traverse::mark(&mut tree);

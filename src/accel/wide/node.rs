@@ -104,6 +104,9 @@ impl Child {
     /// Triangles that can be addressed.
     pub const MAX_TRIANGLES: usize = 1 << 28;
 
+    /// Boxes that can be numbered.
+    pub const MAX_BOXES: usize = 1 << 30;
+
     /// An inner node.
     pub const fn inner(node: usize) -> Self {
         debug_assert!(node < Self::MAX_NODES);
