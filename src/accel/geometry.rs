@@ -138,6 +138,11 @@ impl Affine {
 }
 
 impl Placement {
+    /// Whether it has a finite inverse at every key.
+    pub fn is_usable(&self) -> bool {
+        self.keys.iter().all(Affine::is_usable)
+    }
+
     /// Whether it moves.
     pub fn moves(&self) -> bool {
         self.keys.len() > 1

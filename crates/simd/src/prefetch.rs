@@ -9,7 +9,9 @@ pub fn prefetch<T>(slice: &[T], at: usize, lines: usize) {
         let first = slice.as_ptr().wrapping_add(at).cast::<i8>();
         for line in 0..lines {
             // SAFETY: SSE is part of the architecture, and a prefetch of any address is no access.
-            unsafe { std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(first.wrapping_add(64 * line)) };
+            unsafe {
+                std::arch::x86_64::_mm_prefetch::<{ std::arch::x86_64::_MM_HINT_T0 }>(first.wrapping_add(64 * line))
+            };
         }
     }
     #[cfg(not(target_arch = "x86_64"))]

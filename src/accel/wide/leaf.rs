@@ -27,8 +27,7 @@ impl Nearest {
     /// Whether a hit is nearer, or as near with lower numbers. At the ray's end there is none.
     #[inline(always)]
     pub fn yields_to(&self, t: f32, instance: u32, primitive: u32) -> bool {
-        t < self.t
-            || t == self.t && self.primitive != MISS && (instance, primitive) < (self.instance, self.primitive)
+        t < self.t || t == self.t && self.primitive != MISS && (instance, primitive) < (self.instance, self.primitive)
     }
 }
 

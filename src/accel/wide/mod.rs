@@ -6,21 +6,37 @@
 
 mod build;
 mod collapse;
+mod feed;
 mod leaf;
+mod moving;
 mod node;
 mod packet;
+mod queries;
 mod ray;
 mod source;
+mod special;
 mod traverse;
 mod validate;
 
-use super::geometry::{Geometry, HitFilter};
+use super::geometry::{Geometry, HitFilter, Object, Part, Placement, Shape};
 use super::{Accel, AccelStats, HitBatch, RayBatch};
-use node::{Leaves, Node};
-use simd::{Level, dispatch};
+use glam::Vec3;
+use moving::Moving;
+use node::{Child, Leaves, Node, WIDTH};
+use simd::Level;
 use source::Source;
+use special::{Placed, Special};
+use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Entries of a traversal's stack, a power of two. A node adds at most 7 more than it takes, and a ray is in at most three
+/// trees: over the world's specials, the world's triangles or a placed object's specials, and its triangles.
+const STACK: usize = 2048;
+const _: () = assert!(3 * build::MAX_DEPTH as usize * (WIDTH - 1) < STACK && STACK.is_power_of_two());
+
+/// Nodes near the root: 512 KB, a part of a core's cache.
+const NEAR: usize = 2048;
 
 /// A tree over all triangles of one object but those of zero area, or over boxes.
 #[derive(Clone, Debug)]
@@ -41,7 +57,6 @@ impl Tree {
 
     /// The tree over `boxes` (low and high corner): each is a child of its own, [`node::Child::special`] of its index.
     /// Boxes that are `None`, empty or NaN are left out.
-    #[allow(dead_code, reason = "for placements and shapes, which come next")]
     fn of_boxes(boxes: &[Option<[glam::Vec3; 2]>]) -> Self {
         Self::new(&build::BinaryTree::of_boxes(boxes), None)
     }
@@ -54,8 +69,50 @@ impl Tree {
         let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
         let mut tree = Self { nodes, leaves, depth, bounds };
-        traverse::mark(&mut tree);
+        tree.mark_near();
         tree
+    }
+
+    /// Marks the nodes next to the root, breadth first.
+    fn mark_near(&mut self) {
+        let mut queue = VecDeque::from([0]);
+        let mut left = NEAR;
+        while let Some(at) = queue.pop_front() {
+            let node: &mut Node = &mut self.nodes[at];
+            for lane in 0..node.count() {
+                let child = node.child(lane);
+                if !child.is_inner() {
+                    continue;
+                }
+                if left == 0 {
+                    return;
+                }
+                left -= 1;
+                node.replace(lane, child.near());
+                queue.push_back(child.node());
+            }
+        }
+    }
+
+    /// Appends the nodes of `top`, a tree over boxes, whose special `triangles` becomes this tree's root; returns the new
+    /// root.
+    fn put_below(&mut self, top: Self, triangles: usize) -> Child {
+        let first = self.nodes.len();
+        self.nodes.extend(top.nodes);
+        for node in &mut self.nodes[first..] {
+            for lane in 0..node.count() {
+                let child = node.child(lane);
+                if child.is_special() && child.index() == triangles {
+                    node.replace(lane, Child::inner(0).near());
+                } else if child.is_inner() {
+                    let moved = Child::inner(child.node() + first);
+                    node.replace(lane, if child.is_far() { moved } else { moved.near() });
+                }
+            }
+        }
+        self.depth += top.depth;
+        self.bounds = top.bounds;
+        Child::inner(first).near()
     }
 
     /// Bytes held.
@@ -64,11 +121,68 @@ impl Tree {
     }
 }
 
+/// A space with all that is in it.
+#[derive(Clone)]
+struct Space {
+    /// Over the triangles at rest; where there are specials, its nodes are followed by those of a tree over them, in which
+    /// the triangles' root is an inner node.
+    tree: Tree,
+    /// Where rays start.
+    root: Child,
+    specials: Vec<Special>,
+    shapes: Vec<(Arc<dyn Shape>, u32)>,
+    moving: Vec<Moving>,
+}
+
+impl Space {
+    /// `placed` are the boxes of what is placed in it.
+    fn new(object: Object, placed: impl IntoIterator<Item = Option<[Vec3; 2]>>) -> Self {
+        let Object { parts, shapes } = object;
+        let (still, moving): (Vec<Part>, Vec<Part>) = parts.into_iter().partition(|part| part.later.is_empty());
+        let mut tree = Tree::of_triangles(&Source::new(&still));
+        drop(still);
+        let moving: Vec<Moving> = moving.into_iter().map(Moving::new).collect();
+        let (mut specials, mut boxes) = (Vec::new(), Vec::new());
+        for (i, bounds) in placed.into_iter().enumerate() {
+            specials.push(Special::Placed(i as u32));
+            boxes.push(bounds);
+        }
+        for (i, (shape, _)) in shapes.iter().enumerate() {
+            specials.push(Special::Shape(i as u32));
+            boxes.push(Some(shape.bounds().map(Vec3::from_array)));
+        }
+        for (i, moving) in moving.iter().enumerate() {
+            specials.push(Special::Moving(i as u32));
+            boxes.push(moving.bounds());
+        }
+        let mut root = Child::inner(0).near();
+        if !specials.is_empty() {
+            let has_triangles = tree.nodes[0].count() > 0;
+            boxes.push(has_triangles.then_some(tree.bounds.map(Vec3::from_array)));
+            root = tree.put_below(Tree::of_boxes(&boxes), specials.len());
+        }
+        Self { tree, root, specials, shapes, moving }
+    }
+
+    /// Low and high corner of everything.
+    fn bounds(&self) -> Option<[Vec3; 2]> {
+        let is_empty = self.tree.nodes[self.root.node()].count() == 0;
+        (!is_empty).then_some(self.tree.bounds.map(Vec3::from_array))
+    }
+
+    fn bytes(&self) -> usize {
+        let moving: usize = self.moving.iter().map(Moving::bytes).sum();
+        self.tree.bytes() + moving + size_of_val(&*self.specials)
+    }
+}
+
 /// The backend.
 #[derive(Clone)]
 pub struct WideBvh {
-    /// The triangles at rest of the world.
-    world: Tree,
+    world: Space,
+    objects: Vec<Space>,
+    /// The placements, in their order; one that cannot be met stands for one without an inverse.
+    placed: Vec<Placed>,
     /// For single rays: 8 lanes.
     level: Level,
     /// For packets: any.
@@ -98,40 +212,52 @@ impl WideBvh {
             level => level,
         };
         assert!(packet_level.is_available(), "this CPU has no {}", packet_level.name());
-        let world = Tree::of_triangles(&Source::new(&geometry.world.parts));
-        Self { world, level, packet_level, filter: geometry.filter }
+        let Geometry { world, objects, placements, filter } = geometry;
+        let objects: Vec<Space> = objects.into_iter().map(|object| Space::new(object, [])).collect();
+        let bounds: Vec<_> = objects.iter().map(Space::bounds).collect();
+        let placed_bounds = |p: &Placement| Some(p.bounds(bounds[p.object as usize]?));
+        let boxes: Vec<_> = placements.iter().map(|p| placed_bounds(p).filter(|_| p.is_usable())).collect();
+        let world = Space::new(world, boxes);
+        let placed = placements.iter().map(Placed::new).collect();
+        Self { world, objects, placed, level, packet_level, filter }
     }
 
     /// What is wrong with the tree over `geometry`, if anything: for tests.
     pub fn validate(&self, geometry: impl Into<Geometry>) -> Result<(), String> {
-        validate::validate(&self.world, &Source::new(&geometry.into().world.parts))
+        validate::validate(&self.world.tree, &Source::new(&geometry.into().world.parts))
+    }
+
+    /// Bytes held.
+    fn bytes(&self) -> usize {
+        let objects: usize = self.objects.iter().map(Space::bytes).sum();
+        self.world.bytes() + objects + size_of_val(&*self.placed)
+    }
+
+    /// Whether there is anything but triangles at rest in the world.
+    fn has_specials(&self) -> bool {
+        !self.world.specials.is_empty()
     }
 
     /// A hash of everything in the tree, for tests of determinism.
     pub fn fingerprint(&self) -> u64 {
         // FNV-1a, 32 bits at a time.
         let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0000_0100_0000_01b3);
-        let planes = self.world.nodes.iter().flat_map(|node| node.planes.iter().map(|plane| plane.to_bits()));
-        let children = self.world.nodes.iter().flat_map(|node| node.children.iter().copied().chain(node.order));
-        let leaves = self.world.leaves.data.iter().map(|word| word.to_bits());
+        let trees = || self.objects.iter().chain([&self.world]).map(|space| &space.tree);
+        let nodes = || trees().flat_map(|tree| &tree.nodes);
+        let planes = nodes().flat_map(|node| node.planes.iter().map(|plane| plane.to_bits()));
+        let children = nodes().flat_map(|node| node.children.iter().copied().chain(node.order));
+        let leaves = trees().flat_map(|tree| tree.leaves.data.iter().map(|word| word.to_bits()));
         planes.chain(children).chain(leaves).fold(0xcbf2_9ce4_8422_2325, mix)
     }
 }
 
 impl Accel for WideBvh {
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-        if coherent {
-            let packets = packet::IntersectPackets { bvh: self, rays, range, hits: &mut *hits };
-            for range in dispatch(self.packet_level, packets) {
-                dispatch(self.level, traverse::Intersect { bvh: self, rays, range, hits: &mut *hits });
-            }
-        } else {
-            dispatch(self.level, traverse::Intersect { bvh: self, rays, range, hits });
-        }
+        queries::intersect(self, rays, range, coherent, hits);
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-        dispatch(self.level, traverse::Occluded { bvh: self, rays, n, occluded });
+        queries::occluded(self, rays, n, occluded);
     }
 
     fn stats(&self) -> AccelStats {
@@ -139,7 +265,7 @@ impl Accel for WideBvh {
             name: "bvh",
             version: String::new(),
             isa: self.packet_level.name().into(),
-            bytes: self.world.bytes(),
+            bytes: self.bytes(),
             front: 0,
         }
     }

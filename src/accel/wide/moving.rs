@@ -94,14 +94,7 @@ impl Moving {
         }
     }
 
-    fn meet_triangle(
-        &self,
-        i: usize,
-        ray: &ShapeRay,
-        sheared: &ShearedRay,
-        asked: &Asked<'_>,
-        nearest: &mut Nearest,
-    ) {
+    fn meet_triangle(&self, i: usize, ray: &ShapeRay, sheared: &ShearedRay, asked: &Asked<'_>, nearest: &mut Nearest) {
         let Some(c) = sheared.cross(self.part.corners_at(i, ray.time)) else { return };
         let (primitive, instance) = (self.part.primitives.get(i), asked.instance);
         let word = primitive | if self.part.filtered { FILTERED } else { 0 };

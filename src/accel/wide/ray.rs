@@ -132,16 +132,15 @@ impl<L: Lanes> RayLanes<L> {
         Shape { down: [x == 1, y == 1, z == 1], axes: [kx as usize, ky as usize, kz as usize] }
     }
 
-    /// Whether the rays in `lanes` all have one shape.
+    /// Those of `lanes` (not empty) that have the shape of the first.
     #[inline(always)]
-    pub fn is_uniform(&self, lanes: u32) -> bool {
-        let same = |bits: u32| bits & lanes == 0 || bits & lanes == lanes;
-        same(self.down[0])
-            && same(self.down[1])
-            && same(self.down[2])
-            && same(self.largest[0])
-            && same(self.largest[1])
-            && same(self.largest[2])
+    pub fn alike(&self, lanes: u32) -> u32 {
+        let first = lanes.trailing_zeros();
+        let mut alike = lanes;
+        for bits in self.down.iter().chain(&self.largest) {
+            alike &= if bits >> first & 1 == 1 { *bits } else { !*bits };
+        }
+        alike
     }
 
     /// Where the rays, all of shape `down`, enter the box in lane `child` of `planes`, and those that do so in

@@ -26,11 +26,11 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// `None` where a map has no inverse.
-    pub fn new(placement: &Placement) -> Option<Self> {
-        let object_from_world = placement.at(0.0).inverse()?;
+    /// `placement`, which needs an inverse at time 0 to be met at all.
+    pub fn new(placement: &Placement) -> Self {
+        let object_from_world = placement.at(0.0).inverse().unwrap_or(Affine::IDENTITY);
         let keys = if placement.moves() { placement.keys.clone().into() } else { Box::default() };
-        Some(Self { object: placement.object, object_from_world, keys })
+        Self { object: placement.object, object_from_world, keys }
     }
 
     /// The map at `time`; `None` if it has none then.

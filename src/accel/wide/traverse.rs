@@ -67,7 +67,7 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch
         return;
     }
     let mut feed = Feed::<L, _>::new(tasks, rays, &bvh.world.tree.bounds);
-    let (nowhere, _) = single::<L>(Vec3::ZERO, Vec3::Z, &bvh.world.tree.bounds).expect("a ray");
+    let (nowhere, _) = single::<L>(Vec3::ZERO, Vec3::Z, &[[0.0; 3]; 2]).expect("a ray");
     let mut slots: [Slot<'_, L>; SLOTS] = std::array::from_fn(|_| Slot {
         space: &bvh.world,
         ray: nowhere,
@@ -143,11 +143,7 @@ fn any_is_found<Q: Query>(_: &Q, nearest: &Nearest) -> bool {
 
 /// Goes on with a ray until it is done (false) or asks for memory that may be far (true).
 #[inline(always)]
-fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(
-    bvh: &'a WideBvh,
-    rays: &RayBatch,
-    slot: &mut Slot<'a, L>,
-) -> bool {
+fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &RayBatch, slot: &mut Slot<'a, L>) -> bool {
     let ids = L::U::load(&[0, 1, 2, 3, 4, 5, 6, 7], 0);
     let by_4 = L::U::load(&[4, 5, 6, 7, 0, 1, 2, 3], 0);
     let by_2 = L::U::load(&[2, 3, 0, 1, 6, 7, 4, 5], 0);
