@@ -507,14 +507,22 @@ fn bvh05_chains_stay_within_the_stack() {
         let rays: Vec<Ray> = (0..n).map(|i| (Vec3::new(-1.0, 1e-3, 1e-3) * factor.powi(i), Vec3::X, INF)).collect();
         agreed(&backends(&mesh), &rays);
     }
-    // 2^18 triangles in a row, seen from the end.
-    let mesh = soup((0..1 << 18).map(|i| {
-        let x = i as f32;
-        [Vec3::new(x, 0.0, 0.0), Vec3::new(x, 1.0, 0.0), Vec3::new(x, 0.0, 1.0)]
+}
+
+#[test]
+fn bvh05_a_million_slivers_in_a_row_are_built_and_hit() {
+    let n = 1 << 20;
+    // Ascending, all on one line, and ever thinner.
+    let mesh = soup((0..n).map(|i| {
+        let (x, width) = (i as f32, 1.0 / (1.0 + i as f32));
+        [Vec3::new(x, -width, 0.0), Vec3::new(x, width, -width), Vec3::new(x, 0.0, 1.0)]
     }));
-    let end = Vec3::new(1e6, 0.3, 0.3);
-    let hits = agreed(&fast_backends(&mesh), &[(end * Vec3::new(-1.0, 1.0, 1.0), Vec3::X, INF), (end, -Vec3::X, INF)]);
-    assert_eq!([hits[0].0, hits[1].0], [0, (1 << 18) - 1]);
+    let bvh = WideBvh::build(&mesh);
+    bvh.validate(&mesh).expect("a sound tree");
+    let line = |x: f32| Vec3::new(x, 0.0, 0.1);
+    let rays = [(line(-1.0), Vec3::X, INF), (line(2e6), -Vec3::X, INF), (line(1000.5), Vec3::X, INF)];
+    let hits = trace("bvh", &bvh, &rays);
+    assert_eq!([hits[0].0, hits[1].0, hits[2].0], [0, n - 1, 1001]);
 }
 
 #[test]

@@ -27,6 +27,7 @@ pub struct Triangles {
 
 impl Triangles {
     /// The three corners of triangle `i`.
+    #[inline]
     pub fn corners(&self, i: usize) -> [glam::Vec3; 3] {
         self.indices[i].map(|v| glam::Vec3::from_array(self.positions[v as usize]))
     }

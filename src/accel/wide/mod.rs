@@ -1,9 +1,10 @@
 //! Our own 8-wide BVH: `bvh`, the fallback where there is no Embree.
 //!
-//! `build` makes a binary SAH tree, `collapse` merges it to nodes of up to 8 children and leaves of up to 8 triangles,
-//! `traverse` runs single rays through it and `packet` camera rays: `ray` tests boxes, `leaf` triangles. `node` is the
-//! memory layout.
+//! `build` makes a binary SAH tree of `reference`s, split where `bins` says; `collapse` merges it to nodes of up to 8
+//! children and leaves of up to 8 triangles, `traverse` runs single rays through it and `packet` camera rays: `ray` tests
+//! boxes, `leaf` triangles. `node` is the memory layout.
 
+mod bins;
 mod build;
 mod collapse;
 mod feed;
@@ -13,6 +14,7 @@ mod node;
 mod packet;
 mod queries;
 mod ray;
+mod reference;
 mod source;
 mod special;
 mod traverse;
@@ -62,10 +64,7 @@ impl Tree {
     }
 
     fn new(tree: &build::BinaryTree, triangles: Option<&Source<'_>>) -> Self {
-        let bounds = tree.nodes.first().map_or([[0.0; 3]; 2], |root| {
-            let corner = |v: glam::Vec4| [v.x, v.y, v.z];
-            [corner(root.bounds.low), corner(root.bounds.high)]
-        });
+        let bounds = tree.root.as_ref().map_or([[0.0; 3]; 2], |root| root.root().node().corners);
         let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(tree, triangles);
         assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
         let mut tree = Self { nodes, leaves, depth, bounds };

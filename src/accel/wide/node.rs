@@ -40,6 +40,15 @@ impl Node {
         Self { planes, children: [Child::leaf(0, 1).bits(); WIDTH], order: [0; WIDTH] }
     };
 
+    /// The same where all nodes below it are `by` nodes farther on.
+    pub fn moved(&self, by: usize) -> Self {
+        let mut node = *self;
+        for child in node.children.iter_mut().filter(|child| child.is_inner()) {
+            *child = Child::inner(child.node() + by);
+        }
+        node
+    }
+
     /// Adds a child.
     pub fn push(&mut self, low: [f32; 3], high: [f32; 3], child: Child) {
         let lane = self.count();
