@@ -89,7 +89,7 @@ pub fn collapse(tree: &BinaryTree, triangles: Option<&Source<'_>>) -> Collapsed 
     for part in parts {
         let base = nodes.len();
         if let Some((parent, lane)) = part.parent {
-            nodes[parent].children[lane] = Child::inner(base);
+            nodes[parent].replace(lane, Child::inner(base));
         }
         nodes.extend(part.nodes.iter().map(|node| node.moved(base)));
         depth = depth.max(part.depth);

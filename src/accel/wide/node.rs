@@ -43,8 +43,11 @@ impl Node {
     /// The same where all nodes below it are `by` nodes farther on.
     pub fn moved(&self, by: usize) -> Self {
         let mut node = *self;
-        for child in node.children.iter_mut().filter(|child| child.is_inner()) {
-            *child = Child::inner(child.node() + by);
+        for lane in 0..node.count() {
+            let child = node.child(lane);
+            if child.is_inner() {
+                node.replace(lane, Child::inner(child.node() + by));
+            }
         }
         node
     }
