@@ -46,6 +46,8 @@ fn slices(rays: &RayBatch, range: Range<usize>) -> RaysSoA<'_> {
         dz: &rays.dz[range.clone()],
         t_max: &rays.t_max[range],
         time: None,
+        id: None,
+        mask: None,
     }
 }
 
@@ -58,6 +60,7 @@ impl Accel for EmbreeAccel {
             primitive: &mut hits.primitive[range.clone()],
             geometry: &mut hits.instance[range.clone()],
             instance: None,
+            instance_primitive: None,
         };
         self.scene.intersect_batch(slices(rays, range), coherent, into);
     }

@@ -46,7 +46,7 @@ mod scene;
 pub use batch::{HitsSoAMut, RaysSoA};
 pub use device::Device;
 pub use error::{Error, ErrorCode, LoadError, Reason, Refusal, Version};
-pub use geometry::{Geometry, GeometryId, TriangleGeometry};
+pub use geometry::{Affine, Geometry, GeometryId, InstanceArrayGeometry, InstanceGeometry, TriangleGeometry};
 pub use library::Library;
 pub use probe::HitLayout;
 pub use query::Coherence;

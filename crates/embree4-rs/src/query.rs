@@ -51,6 +51,7 @@ impl CommittedScene {
             primitive: hit.primitive,
             geometry: hit.geometry,
             instance: hit.instance,
+            instance_primitive: hit.instance_primitive,
         })
     }
 

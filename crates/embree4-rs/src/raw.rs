@@ -54,10 +54,16 @@ pub(crate) mod query_flag {
 }
 
 pub(crate) const GEOMETRY_TYPE_TRIANGLE: c_int = 0;
+pub(crate) const GEOMETRY_TYPE_INSTANCE: c_int = 121;
+pub(crate) const GEOMETRY_TYPE_INSTANCE_ARRAY: c_int = 122;
 pub(crate) const BUFFER_TYPE_INDEX: c_int = 0;
 pub(crate) const BUFFER_TYPE_VERTEX: c_int = 1;
+pub(crate) const BUFFER_TYPE_TRANSFORM: c_int = 23;
 pub(crate) const FORMAT_UINT3: c_int = 0x5003;
 pub(crate) const FORMAT_FLOAT3: c_int = 0x9003;
+pub(crate) const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_int = 0x9234;
+/// `RTC_MAX_TIME_STEP_COUNT`.
+pub(crate) const MAX_TIME_STEPS: usize = 129;
 
 /// `RTC_FEATURE_FLAG_ALL`. CPU devices ignore the feature mask; it is there for GPUs.
 const FEATURE_ALL: u32 = u32::MAX;
@@ -195,6 +201,10 @@ function_table! {
         release_geometry = "rtcReleaseGeometry": fn(*mut RtcGeometry);
         set_shared_geometry_buffer = "rtcSetSharedGeometryBuffer":
             fn(*mut RtcGeometry, c_int, u32, c_int, *const c_void, usize, usize, usize);
+        set_geometry_time_step_count = "rtcSetGeometryTimeStepCount": fn(*mut RtcGeometry, u32);
+        set_geometry_mask = "rtcSetGeometryMask": fn(*mut RtcGeometry, u32);
+        set_geometry_instanced_scene = "rtcSetGeometryInstancedScene": fn(*mut RtcGeometry, *mut RtcScene);
+        set_geometry_transform = "rtcSetGeometryTransform": fn(*mut RtcGeometry, u32, c_int, *const c_void);
         commit_geometry = "rtcCommitGeometry": fn(*mut RtcGeometry);
 
         new_scene = "rtcNewScene": fn(*mut RtcDevice) -> *mut RtcScene;

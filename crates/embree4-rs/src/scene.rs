@@ -58,7 +58,7 @@ impl Scene {
         let raw = unsafe { (device.api().new_scene)(device.handle()) };
         drop(lock);
         let raw = device.check_handle(raw, "rtcNewScene")?;
-        let handle = SceneHandle { raw, device: Arc::clone(device), geometries: Vec::new() };
+        let handle = SceneHandle { raw, device: Arc::clone(device), geometries: Vec::new(), has_instances: false };
         // SAFETY: the scene handle is valid and nobody else has it.
         unsafe { (device.api().set_scene_flags)(handle.raw(), flags.0) };
         device.check("rtcSetSceneFlags")?;
@@ -86,6 +86,7 @@ impl Scene {
         let id = unsafe { (device.api().attach_geometry)(self.handle.raw(), raw) };
         let checked = device.check("rtcAttachGeometry");
         // Kept even after an error, in case Embree has it all the same.
+        self.handle.has_instances |= geometry.is_instance();
         self.handle.geometries.push(geometry);
         checked?;
         if id == INVALID_ID {
@@ -135,6 +136,11 @@ impl CommittedScene {
     pub fn geometry(&self, id: GeometryId) -> Option<&Geometry> {
         self.handle.geometries.get(id.0 as usize)
     }
+
+    /// Whether another scene is part of this one; then it cannot be instanced itself.
+    pub fn has_instances(&self) -> bool {
+        self.handle.has_instances
+    }
 }
 
 /// An owned `RTCScene` and all that must outlive it.
@@ -143,6 +149,7 @@ pub(crate) struct SceneHandle {
     pub(crate) device: Arc<Device>,
     /// In the order of their numbers.
     geometries: Vec<Geometry>,
+    has_instances: bool,
 }
 
 // SAFETY: the handle may be used from any thread. Through a shared reference only queries use it, on
