@@ -269,8 +269,8 @@ mod tests {
         let hit = [0, 0, one, 0.25f32.to_bits(), 0.5f32.to_bits(), PRIMITIVE_ID, GEOMETRY_ID, ids[0], ids[1], ids[2]];
         for lane in (0..width).filter(|&lane| lanes.0[lane] != 0) {
             buffer.0[ROW_T_MAX * width + lane] = 3.0f32.to_bits();
-            for row in 0..hit_rows {
-                buffer.0[(RAY_ROWS + row) * width + lane] = hit[row];
+            for (row, &word) in hit[..hit_rows].iter().enumerate() {
+                buffer.0[(RAY_ROWS + row) * width + lane] = word;
             }
         }
         (buffer, lanes)

@@ -81,7 +81,7 @@ pub struct InstanceArrayGeometry {
     scene: Arc<CommittedScene>,
     /// One array per time key, each with one matrix more than there are places, for 16-byte loads of the
     /// last column.
-    keys: Box<Vec<Vec<Affine>>>,
+    keys: Box<[Vec<Affine>]>,
 }
 
 impl InstanceArrayGeometry {
@@ -132,7 +132,7 @@ impl InstanceArrayGeometry {
             device.check("rtcSetSharedGeometryBuffer (transforms)")?;
         }
         handle.commit()?;
-        Ok(Self { handle, scene: Arc::clone(scene), keys: Box::new(keys) })
+        Ok(Self { handle, scene: Arc::clone(scene), keys: keys.into_boxed_slice() })
     }
 
     /// The scene that is placed.
