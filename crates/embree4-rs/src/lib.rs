@@ -33,8 +33,10 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod batch;
+mod callback;
 mod device;
 mod error;
+mod filter;
 mod geometry;
 mod library;
 mod probe;
@@ -46,6 +48,7 @@ mod scene;
 pub use batch::{HitsSoAMut, RaysSoA};
 pub use device::Device;
 pub use error::{Error, ErrorCode, LoadError, Reason, Refusal, Version};
+pub use filter::{Candidate, Filter};
 pub use geometry::{Affine, Geometry, GeometryId, InstanceArrayGeometry, InstanceGeometry, TriangleGeometry};
 pub use library::Library;
 pub use probe::HitLayout;

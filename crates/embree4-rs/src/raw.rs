@@ -8,6 +8,7 @@ use std::ffi::{c_char, c_int, c_void};
 use std::mem::{align_of, offset_of, size_of};
 use std::ptr::null_mut;
 
+use crate::filter::FilterFunction;
 use crate::ray::{Ray, RayHit, RayHitPacket, RayPacket};
 
 /// What an `RTCDevice` points to.
@@ -205,6 +206,11 @@ function_table! {
         set_geometry_mask = "rtcSetGeometryMask": fn(*mut RtcGeometry, u32);
         set_geometry_instanced_scene = "rtcSetGeometryInstancedScene": fn(*mut RtcGeometry, *mut RtcScene);
         set_geometry_transform = "rtcSetGeometryTransform": fn(*mut RtcGeometry, u32, c_int, *const c_void);
+        set_geometry_user_data = "rtcSetGeometryUserData": fn(*mut RtcGeometry, *mut c_void);
+        set_geometry_intersect_filter_function = "rtcSetGeometryIntersectFilterFunction":
+            fn(*mut RtcGeometry, Option<FilterFunction>);
+        set_geometry_occluded_filter_function = "rtcSetGeometryOccludedFilterFunction":
+            fn(*mut RtcGeometry, Option<FilterFunction>);
         commit_geometry = "rtcCommitGeometry": fn(*mut RtcGeometry);
 
         new_scene = "rtcNewScene": fn(*mut RtcDevice) -> *mut RtcScene;

@@ -58,7 +58,13 @@ impl Scene {
         let raw = unsafe { (device.api().new_scene)(device.handle()) };
         drop(lock);
         let raw = device.check_handle(raw, "rtcNewScene")?;
-        let handle = SceneHandle { raw, device: Arc::clone(device), geometries: Vec::new(), has_instances: false };
+        let handle = SceneHandle {
+            raw,
+            device: Arc::clone(device),
+            geometries: Vec::new(),
+            has_instances: false,
+            has_callbacks: false,
+        };
         // SAFETY: the scene handle is valid and nobody else has it.
         unsafe { (device.api().set_scene_flags)(handle.raw(), flags.0) };
         device.check("rtcSetSceneFlags")?;
@@ -87,6 +93,7 @@ impl Scene {
         let checked = device.check("rtcAttachGeometry");
         // Kept even after an error, in case Embree has it all the same.
         self.handle.has_instances |= geometry.is_instance();
+        self.handle.has_callbacks |= geometry.has_callbacks();
         self.handle.geometries.push(geometry);
         checked?;
         if id == INVALID_ID {
@@ -141,6 +148,11 @@ impl CommittedScene {
     pub fn has_instances(&self) -> bool {
         self.handle.has_instances
     }
+
+    /// Whether queries may call back into the program.
+    pub(crate) fn has_callbacks(&self) -> bool {
+        self.handle.has_callbacks
+    }
 }
 
 /// An owned `RTCScene` and all that must outlive it.
@@ -150,6 +162,7 @@ pub(crate) struct SceneHandle {
     /// In the order of their numbers.
     geometries: Vec<Geometry>,
     has_instances: bool,
+    has_callbacks: bool,
 }
 
 // SAFETY: the handle may be used from any thread. Through a shared reference only queries use it, on

@@ -40,6 +40,15 @@ impl Geometry {
         }
     }
 
+    /// Whether a query may call back into the program.
+    pub(crate) fn has_callbacks(&self) -> bool {
+        match self {
+            Self::Triangles(mesh) => mesh.has_filter(),
+            Self::Instance(instance) => instance.scene().has_callbacks(),
+            Self::InstanceArray(instances) => instances.scene().has_callbacks(),
+        }
+    }
+
     /// Whether a scene with this geometry can no longer be instanced.
     pub(crate) fn is_instance(&self) -> bool {
         matches!(self, Self::Instance(_) | Self::InstanceArray(_))

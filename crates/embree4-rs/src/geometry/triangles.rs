@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::{GeometryHandle, check_count, check_keys};
 use crate::device::Device;
 use crate::error::Error;
+use crate::filter::{Filter, FilterData, ask_filter};
 use crate::raw::{
     BUFFER_TYPE_INDEX, BUFFER_TYPE_VERTEX, FORMAT_FLOAT3, FORMAT_UINT3, GEOMETRY_TYPE_TRIANGLE, INVALID_ID,
 };
@@ -18,11 +19,12 @@ const MAX_VERTICES: usize = (16 << 30) / VERTEX_BYTES - 1;
 const MAX_TRIANGLES: usize = u32::MAX as usize - 1;
 
 /// A triangle mesh that Embree reads in place.
-#[derive(Debug)]
 pub struct TriangleGeometry {
-    // Before the arrays: Embree lets go of them first.
+    // Before what Embree has pointers to: it lets go of them first.
     pub(super) handle: GeometryHandle,
     arrays: Box<Arrays>,
+    /// An `Arc` because a `Box` may not move while Embree has its address.
+    filter: Option<Arc<FilterData>>,
 }
 
 /// What Embree reads. Behind a pointer so that a geometry stays small: scenes hold many.
@@ -81,7 +83,7 @@ impl TriangleGeometry {
         unsafe { set_buffer(handle.raw(), BUFFER_TYPE_INDEX, 0, FORMAT_UINT3, data, 0, TRIANGLE_BYTES, count) };
         device.check("rtcSetSharedGeometryBuffer (indices)")?;
         handle.commit()?;
-        Ok(Self { handle, arrays: Box::new(Arrays { keys, indices }) })
+        Ok(Self { handle, arrays: Box::new(Arrays { keys, indices }), filter: None })
     }
 
     /// The vertex positions, of a moving mesh those of its first key.
@@ -108,6 +110,42 @@ impl TriangleGeometry {
     /// Lets only rays meet the mesh whose mask has a bit in common with `mask`. All bits are set at first.
     pub fn set_mask(&mut self, mask: u32) -> Result<(), Error> {
         self.handle.set_mask(mask)
+    }
+
+    /// Lets only those hits of this mesh count that `filter` accepts. A filter that accepts everything costs
+    /// some 5 to 10 % of the speed in this mesh, and nothing in others.
+    pub fn set_filter(&mut self, filter: Arc<dyn Filter>) -> Result<(), Error> {
+        let device = &self.handle.device;
+        let data = Arc::new(FilterData { filter, layout: device.library().hit_layout() });
+        let user = Arc::as_ptr(&data).cast_mut().cast();
+        device.clear_error();
+        // SAFETY: the handle is valid and in no scene yet, so nothing calls back now; the functions take what
+        // the user pointer points to, which the mesh keeps until Embree has let go of the geometry.
+        unsafe {
+            (device.api().set_geometry_user_data)(self.handle.raw(), user);
+            (device.api().set_geometry_intersect_filter_function)(self.handle.raw(), Some(ask_filter));
+            (device.api().set_geometry_occluded_filter_function)(self.handle.raw(), Some(ask_filter));
+        }
+        self.filter = Some(data);
+        device.check("rtcSetGeometryIntersectFilterFunction")?;
+        self.handle.commit()
+    }
+
+    /// Whether the mesh has a filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+}
+
+impl std::fmt::Debug for TriangleGeometry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TriangleGeometry")
+            .field("handle", &self.handle)
+            .field("vertices", &self.positions().len())
+            .field("triangles", &self.indices().len())
+            .field("time_steps", &self.time_steps())
+            .field("has_filter", &self.has_filter())
+            .finish_non_exhaustive()
     }
 }
 
