@@ -24,6 +24,8 @@ pub struct RayBatch {
     pub t_max: Buffer<f32>,
     /// Shutter time in [0, 1].
     pub time: Buffer<f32>,
+    /// What the geometry's filter knows a ray by; read only where parts are filtered.
+    pub key: Buffer<u32>,
 }
 
 impl RayBatch {
@@ -39,6 +41,7 @@ impl RayBatch {
             dz: zeros(),
             t_max: zeros(),
             time: zeros(),
+            key: Buffer::new(n),
         }
     }
 
@@ -47,12 +50,13 @@ impl RayBatch {
         self.ox.len()
     }
 
-    /// Sets ray `i` (time 0).
+    /// Sets ray `i` (time 0, key 0).
     pub fn set(&mut self, i: usize, origin: glam::Vec3, direction: glam::Vec3, t_max: f32) {
         (self.ox[i], self.oy[i], self.oz[i]) = origin.into();
         (self.dx[i], self.dy[i], self.dz[i]) = direction.into();
         self.t_max[i] = t_max;
         self.time[i] = 0.0;
+        self.key[i] = 0;
     }
 }
 
@@ -65,9 +69,9 @@ pub struct HitBatch {
     pub u: Buffer<f32>,
     /// Barycentric weight of the third vertex.
     pub v: Buffer<f32>,
-    /// Triangle index, or [`MISS`].
+    /// Primitive number, or [`MISS`].
     pub primitive: Buffer<u32>,
-    /// Instance index (0 while scenes are flattened).
+    /// 0 for the world, i + 1 for placement i; unspecified for a miss.
     pub instance: Buffer<u32>,
 }
 

@@ -9,8 +9,9 @@
 //! count gives the same bits. Two differences: the permutation and shear are a matrix per ray with zeroes and a one in
 //! it (exact), and the nearest of several hits is chosen by `T / det`. Corners shared by triangles are sheared once.
 
+use super::geometry::{Geometry, Part, Primitives};
 use super::woop::{can_be_hit, exact_edges};
-use super::{Accel, AccelStats, HitBatch, MISS, RayBatch, Triangles};
+use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use simd::{Float, Kernel, Lanes, Level, Mask, Uint, dispatch};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -29,33 +30,38 @@ const MOST_CORNERS: usize = 3 * MOST;
 pub struct Split {
     /// The front; `None` if no triangle is worth it or too many are.
     pub front: Option<Big>,
-    /// What is left, with the index that each triangle had.
-    pub rest: Triangles,
-    /// The index among all triangles of each one in `rest`; empty if `rest` is everything.
-    pub rest_primitive: Vec<u32>,
+    /// What is left.
+    pub rest: Geometry,
 }
 
 /// The short list.
 pub struct Big {
     /// Distinct corners.
     corners: Vec<[f32; 3]>,
-    /// Three corners and the index among all triangles; ascending.
+    /// Three corners and the primitive number; ascending.
     triangles: Vec<([u16; 3], u32)>,
 }
 
 impl Split {
-    /// All triangles if they are few; else the big ones if those are few.
-    pub fn new(all: Triangles) -> Self {
-        let few = all.indices.len() <= MOST;
-        let scene_area = box_area(all.positions_in_use());
-        let is_big = |i: usize| few || box_area(all.corners(i)) >= BIG * scene_area;
-        let chosen: Vec<usize> = (0..all.indices.len()).filter(|&i| is_big(i)).take(MOST + 1).collect();
+    /// Of the world's triangles that neither move nor ask a filter: all if there is little else, or else the big ones if
+    /// those are few.
+    pub fn new(all: impl Into<Geometry>) -> Self {
+        let mut rest = all.into();
+        let few = rest.placements.is_empty() && rest.triangle_count() <= MOST;
+        let scene_area = rest.bounds().map_or(0.0, box_area);
+        let mut chosen = Vec::new();
+        for (p, part) in rest.world.parts.iter().enumerate().filter(|(_, part)| suits(part)) {
+            let is_big = |&i: &usize| few || box_area(part.triangles.corners(i)) >= BIG * scene_area;
+            let wanted = MOST + 1 - chosen.len();
+            chosen.extend((0..part.triangles.indices.len()).filter(is_big).take(wanted).map(|i| (p, i)));
+        }
         if chosen.is_empty() || chosen.len() > MOST {
-            return Self { front: None, rest: all, rest_primitive: Vec::new() };
+            return Self { front: None, rest };
         }
         let (mut big, mut known) = (Big { corners: Vec::new(), triangles: Vec::new() }, HashMap::new());
-        for &i in &chosen {
-            let corners = all.corners(i);
+        for &(p, i) in &chosen {
+            let part = &rest.world.parts[p];
+            let corners = part.triangles.corners(i);
             if !can_be_hit(corners) {
                 continue;
             }
@@ -65,19 +71,37 @@ impl Split {
                     (big.corners.len() - 1) as u16
                 })
             });
-            big.triangles.push((ids, i as u32));
+            big.triangles.push((ids, part.primitives.get(i)));
         }
-        let mut rest = Triangles { positions: all.positions, indices: Vec::new() };
-        let mut rest_primitive = Vec::new();
-        let mut next = chosen.iter().peekable();
-        for (i, triangle) in all.indices.into_iter().enumerate() {
-            if next.next_if(|&&c| c == i).is_none() {
-                rest.indices.push(triangle);
-                rest_primitive.push(i as u32);
+        big.triangles.sort_unstable_by_key(|&(_, primitive)| primitive);
+        for (p, part) in rest.world.parts.iter_mut().enumerate() {
+            let taken: Vec<usize> = chosen.iter().filter(|c| c.0 == p).map(|c| c.1).collect();
+            if !taken.is_empty() {
+                take(part, &taken);
             }
         }
-        Self { front: Some(big), rest, rest_primitive }
+        rest.world.parts.retain(|part| !part.triangles.indices.is_empty());
+        Self { front: Some(big), rest }
     }
+}
+
+/// Whether the front can do what a part needs.
+fn suits(part: &Part) -> bool {
+    part.later.is_empty() && !part.filtered
+}
+
+/// Removes the triangles `taken` (ascending) from a part; the others keep their numbers.
+fn take(part: &mut Part, taken: &[usize]) {
+    let mut next = taken.iter().peekable();
+    let (mut indices, mut numbers) = (Vec::new(), Vec::new());
+    for (i, &triangle) in part.triangles.indices.iter().enumerate() {
+        if next.next_if(|&&t| t == i).is_none() {
+            indices.push(triangle);
+            numbers.push(part.primitives.get(i));
+        }
+    }
+    part.triangles.indices = indices;
+    part.primitives = Primitives::Each(numbers);
 }
 
 /// Half the surface of the box about `points`.
@@ -102,23 +126,16 @@ pub struct Front {
 
 struct Behind {
     accel: Box<dyn Accel>,
-    primitive: Vec<u32>,
     low: [f32; 3],
     high: [f32; 3],
 }
 
 impl Front {
-    /// `behind` was built from `rest`, whose triangles had the indices `rest_primitive`.
-    pub fn new(big: Big, behind: Box<dyn Accel>, rest: &Triangles, rest_primitive: Vec<u32>) -> Self {
+    /// `behind` was built from the rest, which lies within `bounds`; `None` if nothing is left.
+    pub fn new(big: Big, behind: Box<dyn Accel>, bounds: Option<[glam::Vec3; 2]>) -> Self {
         let mut stats = behind.stats();
         stats.front = big.triangles.len();
-        let behind = (!rest.indices.is_empty()).then(|| {
-            let (mut low, mut high) = (glam::Vec3::INFINITY, glam::Vec3::NEG_INFINITY);
-            for p in rest.positions_in_use() {
-                (low, high) = (low.min(p), high.max(p));
-            }
-            Behind { accel: behind, primitive: rest_primitive, low: low.to_array(), high: high.to_array() }
-        });
+        let behind = bounds.map(|[low, high]| Behind { accel: behind, low: low.to_array(), high: high.to_array() });
         Self { big, behind, stats, level: Level::best() }
     }
 
@@ -163,7 +180,7 @@ impl Onward {
         let r = &mut self.rays;
         (r.ox[to], r.oy[to], r.oz[to]) = (rays.ox[i], rays.oy[i], rays.oz[i]);
         (r.dx[to], r.dy[to], r.dz[to]) = (rays.dx[i], rays.dy[i], rays.dz[i]);
-        (r.t_max[to], r.time[to]) = (t_max, rays.time[i]);
+        (r.t_max[to], r.time[to], r.key[to]) = (t_max, rays.time[i], rays.key[i]);
         self.from.push(i as u32);
     }
 }
@@ -182,8 +199,8 @@ impl Accel for Front {
                     hits.t[i] = onward.hits.t[k];
                     hits.u[i] = onward.hits.u[k];
                     hits.v[i] = onward.hits.v[k];
-                    hits.primitive[i] = behind.primitive[primitive as usize];
-                    hits.instance[i] = 0;
+                    hits.primitive[i] = primitive;
+                    hits.instance[i] = onward.hits.instance[k];
                 }
             }
         });

@@ -6,6 +6,7 @@
 mod batch;
 pub mod embree;
 pub mod front;
+pub mod geometry;
 pub mod linear;
 pub mod wide;
 mod woop;
@@ -56,7 +57,7 @@ pub struct AccelStats {
 /// Hits lie in 0 < t < `t_max`, both ends excluded: origins are already offset, so t = 0 is the surface that was left.
 /// `bvh` and `linear` leave out triangles of exactly zero area, which a rounded test would hit now and then.
 /// A ray with a non-finite origin or direction, a zero direction or a NaN `t_max` misses. Ties (equal t) go to the
-/// lowest primitive for `bvh` and `linear`.
+/// lowest instance, then to the lowest primitive, for `bvh` and `linear`.
 pub trait Accel: Send + Sync {
     /// Nearest hits of `rays[range]` into `hits[range]`. `coherent` is a hint: camera rays in pixel order.
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch);

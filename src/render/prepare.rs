@@ -3,8 +3,9 @@
 use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::emission::mean_emissions;
 use super::{AccelChoice, AccelReport, RenderSettings};
+use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
-use crate::accel::{Accel, AccelStats, Triangles, embree::EmbreeAccel, linear::Linear, wide::WideBvh};
+use crate::accel::{Accel, AccelStats, Triangles, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::SceneTables;
 use crate::light::environment::EnvironmentTable;
@@ -302,26 +303,27 @@ fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dy
         let report = report(&*accel, requested, note);
         return Ok((accel, report));
     }
-    let Split { front, rest, rest_primitive } = Split::new(geometry);
+    let Split { front, rest } = Split::new(geometry);
+    let bounds = rest.bounds();
     let behind: Box<dyn Accel> = match settings.accel {
         AccelChoice::Linear => unreachable!("returned above"),
-        AccelChoice::Bvh => Box::new(WideBvh::build(&rest)),
-        AccelChoice::Embree => Box::new(EmbreeAccel::build(&rest, &settings.embree_dirs)?),
-        AccelChoice::Auto if rest.indices.is_empty() => {
+        AccelChoice::Bvh => Box::new(WideBvh::build(rest)),
+        AccelChoice::Embree => Box::new(EmbreeAccel::build(rest, &settings.embree_dirs)?),
+        AccelChoice::Auto if bounds.is_none() => {
             // Opening libembree4 costs tens of milliseconds, for nothing.
             note = String::from("every triangle is tested in packets, so no Embree is needed");
-            Box::new(WideBvh::build(&rest))
+            Box::new(WideBvh::build(rest))
         }
-        AccelChoice::Auto => match EmbreeAccel::build(&rest, &settings.embree_dirs) {
-            Ok(embree) => Box::new(embree),
+        AccelChoice::Auto => match embree::find(&settings.embree_dirs) {
+            Ok(library) => Box::new(EmbreeAccel::build_with(rest, &library)?),
             Err(why) => {
                 note = why.to_string();
-                Box::new(WideBvh::build(&rest))
+                Box::new(WideBvh::build(rest))
             }
         },
     };
     let accel = match front {
-        Some(big) => Box::new(Front::new(big, behind, &rest, rest_primitive)),
+        Some(big) => Box::new(Front::new(big, behind, bounds)),
         None => behind,
     };
     let report = report(&*accel, requested, note);

@@ -8,7 +8,7 @@
 
 use super::collapse::{Costs, combine, leaf_cost};
 use super::node::Child;
-use crate::accel::Triangles;
+use super::source::Source;
 use crate::accel::woop::can_be_hit;
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -35,7 +35,7 @@ impl Reference {
     /// The triangle's bounds, padded by what the watertight test may be off by: the ray's distance to a vertex is
     /// rounded relative to the triangle's extent (about 10 eps of it, 16 are taken; the share that grows with the
     /// distance is the ray's, see `ray.rs`).
-    fn new(triangles: &Triangles, i: usize) -> Option<Self> {
+    fn new(triangles: &Source<'_>, i: usize) -> Option<Self> {
         let [a, b, c] = triangles.corners(i);
         if !can_be_hit([a, b, c]) {
             return None;
@@ -49,7 +49,7 @@ impl Reference {
         Some(Self { low: Vec3::from(low).extend(tag), high: Vec3::from(high).extend(0.0) })
     }
 
-    /// Index of the triangle.
+    /// Index of the triangle in the source.
     pub fn primitive(&self) -> u32 {
         self.low.w.to_bits() & !(1 << 30)
     }
@@ -116,8 +116,8 @@ pub struct BinaryTree {
 
 impl BinaryTree {
     /// The tree over all triangles that can be hit.
-    pub fn build(triangles: &Triangles) -> Self {
-        let n = triangles.indices.len();
+    pub fn build(triangles: &Source<'_>) -> Self {
+        let n = triangles.len();
         assert!(n < Child::MAX_TRIANGLES, "the bvh holds up to 2^28 triangles, not {n}");
         let mut references: Vec<_> =
             (0..n).into_par_iter().with_min_len(PARALLEL).filter_map(|i| Reference::new(triangles, i)).collect();

@@ -6,7 +6,7 @@
 
 use super::build::{Binary, BinaryTree, Bounds};
 use super::node::{Child, LEAF_ROWS, Leaves, Node, WIDTH};
-use crate::accel::Triangles;
+use super::source::Source;
 
 /// Least cost of a subtree that may take up to 1, 2, ... 7 lanes of the node above it.
 pub type Costs = [f32; WIDTH - 1];
@@ -48,7 +48,7 @@ pub struct Collapsed {
 }
 
 /// Collapses `tree`. Nodes come in depth-first order.
-pub fn collapse(tree: &BinaryTree, triangles: &Triangles) -> Collapsed {
+pub fn collapse(tree: &BinaryTree, triangles: &Source<'_>) -> Collapsed {
     let n = tree.references.len();
     let mut out = Writer {
         tree,
@@ -71,7 +71,7 @@ pub fn collapse(tree: &BinaryTree, triangles: &Triangles) -> Collapsed {
 
 struct Writer<'a> {
     tree: &'a BinaryTree,
-    triangles: &'a Triangles,
+    triangles: &'a Source<'a>,
     nodes: Vec<Node>,
     data: Vec<f32>,
     depth: usize,
@@ -136,14 +136,10 @@ impl Writer<'_> {
         let primitives = || references.iter().map(|r| r.primitive());
         for corner in 0..3 {
             for axis in 0..3 {
-                let row = primitives().map(|p| {
-                    let vertex = self.triangles.indices[p as usize][corner];
-                    self.triangles.positions[vertex as usize][axis]
-                });
-                self.data.extend(row);
+                self.data.extend(primitives().map(|p| self.triangles.corners(p as usize)[corner][axis]));
             }
         }
-        self.data.extend(primitives().map(f32::from_bits));
+        self.data.extend(primitives().map(|p| f32::from_bits(self.triangles.word(p as usize))));
         Child::leaf(at, count)
     }
 }

@@ -1,8 +1,9 @@
 //! The watertight test on a whole leaf: the operations of `woop.rs`, in its order, on 8 triangles.
 
-use super::node::{Child, Leaves, WIDTH};
+use super::node::{Child, FILTERED, Leaves, WIDTH};
 use super::ray::SingleRay;
 use crate::accel::MISS;
+use crate::accel::geometry::{Candidate, HitFilter};
 use crate::accel::woop::exact_edges;
 use simd::{Float, Lanes, Mask};
 
@@ -13,6 +14,28 @@ pub struct Nearest {
     pub u: f32,
     pub v: f32,
     pub primitive: u32,
+}
+
+/// Who is asked about hits on filtered triangles, and for which ray.
+#[derive(Clone, Copy)]
+pub struct Asked<'a> {
+    pub filter: Option<&'a dyn HitFilter>,
+    pub key: u32,
+    pub instance: u32,
+}
+
+impl Asked<'_> {
+    /// Whether the ray passes the triangle of `word` at (u, v).
+    #[inline(always)]
+    pub fn passes(&self, word: u32, u: f32, v: f32) -> bool {
+        word & FILTERED != 0 && self.passes_filtered(word & !FILTERED, u, v)
+    }
+
+    #[cold]
+    fn passes_filtered(&self, primitive: u32, u: f32, v: f32) -> bool {
+        let candidate = Candidate { key: self.key, instance: self.instance, primitive, u, v };
+        !self.filter.is_some_and(|filter| filter.stops(&candidate))
+    }
 }
 
 /// Crossings of a ray with up to 8 triangles, in lanes.
@@ -92,16 +115,23 @@ fn one_side<L: Lanes>(e0: L::F, e1: L::F, e2: L::F) -> u32 {
 /// Updates `nearest` by the triangles of `leaf`; true if there was a nearer one or, at equal t, one of lower index.
 /// `nearest.t` starts as the ray's end, which is excluded.
 #[inline(always)]
-pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, nearest: &mut Nearest) -> bool {
+pub fn intersect<L: Lanes>(
+    leaves: &Leaves,
+    leaf: Child,
+    ray: &SingleRay<L>,
+    asked: &Asked<'_>,
+    nearest: &mut Nearest,
+) -> bool {
     let Some(found) = crossings::<L>(leaves, leaf, ray, nearest.t) else { return false };
     let mut bits = found.bits;
     let mut changed = false;
     while bits != 0 {
         let i = bits.trailing_zeros() as usize % WIDTH;
         bits &= bits - 1;
-        let primitive = leaves.primitive(leaf, i);
+        let word = leaves.word(leaf, i);
+        let primitive = word & !FILTERED;
         let tie = found.t[i] == nearest.t && nearest.primitive != MISS && primitive < nearest.primitive;
-        if found.t[i] < nearest.t || tie {
+        if (found.t[i] < nearest.t || tie) && !asked.passes(word, found.u[i], found.v[i]) {
             *nearest = Nearest { t: found.t[i], u: found.u[i], v: found.v[i], primitive };
             changed = true;
         }
@@ -111,8 +141,10 @@ pub fn intersect<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, nea
 
 /// Whether any triangle of `leaf` lies in (0, `t_max`).
 #[inline(always)]
-pub fn occluded<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, t_max: f32) -> bool {
+pub fn occluded<L: Lanes>(leaves: &Leaves, leaf: Child, ray: &SingleRay<L>, asked: &Asked<'_>, t_max: f32) -> bool {
     let Some(found) = crossings::<L>(leaves, leaf, ray, t_max) else { return false };
     // The end itself is excluded.
-    (0..WIDTH).any(|i| found.bits >> i & 1 == 1 && found.t[i] < t_max)
+    (0..WIDTH).any(|i| {
+        found.bits >> i & 1 == 1 && found.t[i] < t_max && !asked.passes(leaves.word(leaf, i), found.u[i], found.v[i])
+    })
 }

@@ -10,33 +10,65 @@ mod leaf;
 mod node;
 mod packet;
 mod ray;
+mod source;
 mod traverse;
 mod validate;
 
-use super::{Accel, AccelStats, HitBatch, RayBatch, Triangles};
+use super::geometry::{Geometry, HitFilter};
+use super::{Accel, AccelStats, HitBatch, RayBatch};
 use node::{Leaves, Node};
 use simd::{Level, dispatch};
+use source::Source;
 use std::ops::Range;
+use std::sync::Arc;
 
-/// The tree, over all triangles but those of zero area.
+/// A tree over all triangles of one object but those of zero area, or over boxes.
 #[derive(Clone, Debug)]
-pub struct WideBvh {
+struct Tree {
     nodes: Vec<Node>,
     leaves: Leaves,
     /// Nodes from the root to the deepest leaf.
     depth: usize,
     /// Low and high corner of everything.
     bounds: [[f32; 3]; 2],
+}
+
+impl Tree {
+    /// The tree over `triangles`.
+    fn of_triangles(triangles: &Source<'_>) -> Self {
+        let tree = build::BinaryTree::build(triangles);
+        let bounds = tree.nodes.first().map_or([[0.0; 3]; 2], |root| {
+            let corner = |v: glam::Vec4| [v.x, v.y, v.z];
+            [corner(root.bounds.low), corner(root.bounds.high)]
+        });
+        let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
+        assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
+        Self { nodes, leaves, depth, bounds }
+    }
+
+    /// Bytes held.
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.leaves.data)
+    }
+}
+
+/// The backend.
+#[derive(Clone)]
+pub struct WideBvh {
+    /// The triangles at rest of the world.
+    world: Tree,
     /// For single rays: 8 lanes.
     level: Level,
     /// For packets: any.
     packet_level: Level,
+    /// Decides about hits on filtered triangles.
+    filter: Option<Arc<dyn HitFilter>>,
 }
 
 impl WideBvh {
     /// Builds with the threads of rayon's current pool; the tree does not depend on how many they are.
-    pub fn build(triangles: &Triangles) -> Self {
-        Self::with_level(triangles, Level::best())
+    pub fn build(geometry: impl Into<Geometry>) -> Self {
+        Self::with_level(geometry, Level::best())
     }
 
     /// As [`WideBvh::build`], traced at `level`: camera rays in packets of its lanes, single rays at the nearest level
@@ -44,7 +76,8 @@ impl WideBvh {
     ///
     /// # Panics
     /// When this CPU does not have the level.
-    pub fn with_level(triangles: &Triangles, level: Level) -> Self {
+    pub fn with_level(geometry: impl Into<Geometry>, level: Level) -> Self {
+        let geometry = geometry.into();
         // AVX-512 gives single rays nothing: in Embree 4.4 AVX2 is as fast or up to 1.14 times faster.
         let packet_level = level;
         let level = match level {
@@ -53,28 +86,22 @@ impl WideBvh {
             level => level,
         };
         assert!(packet_level.is_available(), "this CPU has no {}", packet_level.name());
-        let tree = build::BinaryTree::build(triangles);
-        let bounds = tree.nodes.first().map_or([[0.0; 3]; 2], |root| {
-            let corner = |v: glam::Vec4| [v.x, v.y, v.z];
-            [corner(root.bounds.low), corner(root.bounds.high)]
-        });
-        let collapse::Collapsed { nodes, leaves, depth } = collapse::collapse(&tree, triangles);
-        assert!(depth <= build::MAX_DEPTH as usize, "the traversal's stack has room for this depth");
-        Self { nodes, leaves, depth, bounds, level, packet_level }
+        let world = Tree::of_triangles(&Source::new(&geometry.world.parts));
+        Self { world, level, packet_level, filter: geometry.filter }
     }
 
-    /// What is wrong with the tree over `triangles`, if anything: for tests.
-    pub fn validate(&self, triangles: &Triangles) -> Result<(), String> {
-        validate::validate(self, triangles)
+    /// What is wrong with the tree over `geometry`, if anything: for tests.
+    pub fn validate(&self, geometry: impl Into<Geometry>) -> Result<(), String> {
+        validate::validate(&self.world, &Source::new(&geometry.into().world.parts))
     }
 
     /// A hash of everything in the tree, for tests of determinism.
     pub fn fingerprint(&self) -> u64 {
         // FNV-1a, 32 bits at a time.
         let mix = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x0000_0100_0000_01b3);
-        let planes = self.nodes.iter().flat_map(|node| node.planes.iter().map(|plane| plane.to_bits()));
-        let children = self.nodes.iter().flat_map(|node| node.children.iter().map(|child| child.bits()));
-        let leaves = self.leaves.data.iter().map(|word| word.to_bits());
+        let planes = self.world.nodes.iter().flat_map(|node| node.planes.iter().map(|plane| plane.to_bits()));
+        let children = self.world.nodes.iter().flat_map(|node| node.children.iter().map(|child| child.bits()));
+        let leaves = self.world.leaves.data.iter().map(|word| word.to_bits());
         planes.chain(children).chain(leaves).fold(0xcbf2_9ce4_8422_2325, mix)
     }
 }
@@ -100,7 +127,7 @@ impl Accel for WideBvh {
             name: "bvh",
             version: String::new(),
             isa: self.packet_level.name().into(),
-            bytes: size_of_val(&*self.nodes) + size_of_val(&*self.leaves.data),
+            bytes: self.world.bytes(),
             front: 0,
         }
     }

@@ -6,6 +6,9 @@ pub const WIDTH: usize = 8;
 /// Rows of a leaf: three corners of three coordinates, then the triangles' indices.
 pub const LEAF_ROWS: usize = 10;
 
+/// Set in a leaf's primitive number where the geometry's filter decides about hits.
+pub const FILTERED: u32 = 1 << 31;
+
 /// A node: the boxes of its children, as rows, and where they are. Four cache lines, nothing quantised: decoding 8-bit
 /// boxes at every node halves the speed of incoherent rays on a CPU.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +48,8 @@ impl Node {
     }
 }
 
-/// Where a child is. Inner: index of a node, bit 31 clear. Leaf: bit 31 set, triangles - 1 in bits 28 to 30, index of
+/// Where a child is. Inner: index of a node, bits 30 and 31 clear. Special: bit 31 clear, bit 30 set, index of a box in
+/// bits 0 to 29. Leaf: bit 31 set, triangles - 1 in bits 28 to 30, index of
 /// the first triangle in leaf order in bits 0 to 27.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
@@ -57,8 +61,14 @@ impl Child {
 
     /// An inner node.
     pub const fn inner(node: usize) -> Self {
-        debug_assert!(node < 1 << 31);
+        debug_assert!(node < 1 << 30);
         Self(node as u32)
+    }
+
+    /// Something else than triangles, by its number among the boxes that the tree was built from.
+    pub const fn special(index: usize) -> Self {
+        debug_assert!(index < 1 << 30);
+        Self(1 << 30 | index as u32)
     }
 
     /// `count` triangles, 1 to 8, from `first` on.
@@ -76,6 +86,18 @@ impl Child {
     #[inline(always)]
     pub const fn is_leaf(self) -> bool {
         self.0 >> 31 == 1
+    }
+
+    /// Whether it is an inner node.
+    #[inline(always)]
+    pub const fn is_inner(self) -> bool {
+        self.0 >> 30 == 0
+    }
+
+    /// Number of a box.
+    #[inline(always)]
+    pub const fn index(self) -> usize {
+        self.0 as usize & ((1 << 30) - 1)
     }
 
     /// Index of an inner node.
@@ -113,9 +135,9 @@ impl Leaves {
         leaf.first() * LEAF_ROWS
     }
 
-    /// Index of triangle `i` of `leaf` among the triangles that the tree was built from.
+    /// Primitive number of triangle `i` of `leaf`, and [`FILTERED`] where that applies.
     #[inline(always)]
-    pub fn primitive(&self, leaf: Child, i: usize) -> u32 {
+    pub fn word(&self, leaf: Child, i: usize) -> u32 {
         self.data[Self::offset(leaf) + (LEAF_ROWS - 1) * leaf.count() + i].to_bits()
     }
 }

@@ -7,8 +7,8 @@
 //! with 500 000 triangles, where few rays of a packet share a leaf.
 
 use super::WideBvh;
-use super::leaf::{cross, sheared};
-use super::node::{Child, LEAF_ROWS, Leaves};
+use super::leaf::{Asked, cross, sheared};
+use super::node::{Child, FILTERED, LEAF_ROWS, Leaves};
 use super::ray::{RayLanes, Shape, box_ends};
 use super::traverse::STACK;
 use crate::accel::{HitBatch, MISS, RayBatch};
@@ -58,7 +58,7 @@ impl Kernel for IntersectPackets<'_> {
         let last = (range.end / L::N * L::N).max(first);
         remaining.extend([range.start..first, last..range.end]);
         for at in (first..last).step_by(L::N) {
-            let packet = RayLanes::<L>::new(rays, at, &bvh.bounds);
+            let packet = RayLanes::<L>::new(rays, at, &bvh.world.bounds);
             if !packet.is_uniform(packet.valid) {
                 remaining.push(at..at + L::N);
                 continue;
@@ -66,7 +66,7 @@ impl Kernel for IntersectPackets<'_> {
             let mut nearest =
                 NearestLanes::<L> { t: packet.t_max, u: L::F::zero(), v: L::F::zero(), primitive: L::U::splat(MISS) };
             if packet.valid != 0 {
-                intersect_packet::<L>(bvh, &packet, &mut stack, &mut nearest);
+                intersect_packet::<L>(bvh, &packet, &rays.key[at..at + L::N], &mut stack, &mut nearest);
             }
             nearest.t.store(&mut hits.t, at);
             nearest.u.store(&mut hits.u, at);
@@ -82,6 +82,7 @@ impl Kernel for IntersectPackets<'_> {
 fn intersect_packet<L: Lanes>(
     bvh: &WideBvh,
     packet: &RayLanes<L>,
+    keys: &[u32],
     stack: &mut [Entry; STACK],
     nearest: &mut NearestLanes<L>,
 ) {
@@ -101,11 +102,11 @@ fn intersect_packet<L: Lanes>(
             continue;
         }
         if child.is_leaf() {
-            intersect_leaf::<L>(&bvh.leaves, child, packet, shape, lanes, nearest);
+            intersect_leaf::<L>(bvh, child, packet, shape, keys, lanes, nearest);
             end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
             continue;
         }
-        let node = &bvh.nodes[child.node()];
+        let node = &bvh.world.nodes[child.node()];
         let base = len;
         for i in 0..(node.count as usize).min(node.children.len()) {
             let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
@@ -130,15 +131,16 @@ fn intersect_packet<L: Lanes>(
 
 #[inline(always)]
 fn intersect_leaf<L: Lanes>(
-    leaves: &Leaves,
+    bvh: &WideBvh,
     leaf: Child,
     packet: &RayLanes<L>,
     shape: Shape,
+    keys: &[u32],
     lanes: u32,
     nearest: &mut NearestLanes<L>,
 ) {
     let n = leaf.count();
-    let rows = &leaves.data[Leaves::offset(leaf)..][..LEAF_ROWS * n];
+    let rows = &bvh.world.leaves.data[Leaves::offset(leaf)..][..LEAF_ROWS * n];
     for i in 0..n {
         let a = corner::<L>(rows, i, n, packet, shape);
         let b = corner::<L>(rows, 3 * n + i, n, packet, shape);
@@ -147,15 +149,42 @@ fn intersect_leaf<L: Lanes>(
         if bits == 0 {
             continue;
         }
-        let primitive = L::U::splat(rows[9 * n + i].to_bits());
+        let word = rows[9 * n + i].to_bits();
+        let primitive = L::U::splat(word & !FILTERED);
         let none = nearest.primitive.eq(L::U::splat(MISS));
         let tie = t.eq(nearest.t) & primitive.lt(nearest.primitive) & !none;
-        let nearer = L::M::from_bits(bits) & (t.lt(nearest.t) | tie);
+        let mut nearer = L::M::from_bits(bits) & (t.lt(nearest.t) | tie);
+        if word & FILTERED != 0 {
+            nearer = nearer & !passing::<L>(bvh, word, nearer.bits(), keys, u, v);
+        }
         nearest.t = t.or_else(nearer, nearest.t);
         nearest.u = u.or_else(nearer, nearest.u);
         nearest.v = v.or_else(nearer, nearest.v);
         nearest.primitive = primitive.or_else(nearer, nearest.primitive);
     }
+}
+
+/// Which rays of `bits` pass the filtered triangle of `word`.
+#[cold]
+#[inline(never)]
+fn ask(bvh: &WideBvh, word: u32, mut bits: u32, keys: &[u32], u: &[f32; MAX_LANES], v: &[f32; MAX_LANES]) -> u32 {
+    let mut passing = 0;
+    while bits != 0 {
+        let i = bits.trailing_zeros() as usize % MAX_LANES;
+        bits &= bits - 1;
+        let asked = Asked { filter: bvh.filter.as_deref(), key: keys[i], instance: 0 };
+        passing |= u32::from(asked.passes(word, u[i], v[i])) << i;
+    }
+    passing
+}
+
+/// [`ask`] with vectors.
+#[inline(always)]
+fn passing<L: Lanes>(bvh: &WideBvh, word: u32, bits: u32, keys: &[u32], u: L::F, v: L::F) -> L::M {
+    let mut lanes = [[0.0; MAX_LANES]; 2];
+    u.store(&mut lanes[0], 0);
+    v.store(&mut lanes[1], 0);
+    L::M::from_bits(ask(bvh, word, bits, keys, &lanes[0], &lanes[1]))
 }
 
 /// One corner, for all rays.

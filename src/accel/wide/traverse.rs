@@ -5,7 +5,7 @@
 
 use super::WideBvh;
 use super::build::MAX_DEPTH;
-use super::leaf::{self, Nearest};
+use super::leaf::{self, Asked, Nearest};
 use super::node::{Child, WIDTH};
 use super::ray::{RayLanes, SingleRay, box_end};
 use crate::accel::{HitBatch, MISS, RayBatch};
@@ -81,19 +81,20 @@ impl Kernel for Intersect<'_> {
             return;
         }
         let mut stack = Stack::new();
-        let mut lanes = RayLanes::<L>::new(rays, range.start / WIDTH * WIDTH, &bvh.bounds);
+        let mut lanes = RayLanes::<L>::new(rays, range.start / WIDTH * WIDTH, &bvh.world.bounds);
         let mut stored = [[0.0; WIDTH]; 18];
         lanes.store(&mut stored);
         for i in range {
             let lane = i % WIDTH;
             if lane == 0 {
-                lanes = RayLanes::new(rays, i, &bvh.bounds);
+                lanes = RayLanes::new(rays, i, &bvh.world.bounds);
                 lanes.store(&mut stored);
             }
             let mut nearest = Nearest { t: rays.t_max[i], u: 0.0, v: 0.0, primitive: MISS };
             if lanes.valid >> lane & 1 == 1 {
                 let ray = SingleRay::<L>::new(&stored, lane, lanes.shape(lane));
-                intersect_one(bvh, &ray, &mut stack, &mut nearest);
+                let asked = Asked { filter: bvh.filter.as_deref(), key: rays.key[i], instance: 0 };
+                intersect_one(bvh, &ray, &asked, &mut stack, &mut nearest);
             }
             (hits.t[i], hits.u[i], hits.v[i]) = (nearest.t, nearest.u, nearest.v);
             hits.primitive[i] = nearest.primitive;
@@ -103,13 +104,19 @@ impl Kernel for Intersect<'_> {
 }
 
 #[inline(always)]
-fn intersect_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, stack: &mut Stack, nearest: &mut Nearest) {
+fn intersect_one<L: Lanes>(
+    bvh: &WideBvh,
+    ray: &SingleRay<L>,
+    asked: &Asked<'_>,
+    stack: &mut Stack,
+    nearest: &mut Nearest,
+) {
     let mut end = box_end(nearest.t);
     stack.len = 0;
     let mut child = Child::inner(0);
     loop {
         while !child.is_leaf() {
-            let node = &bvh.nodes[child.node()];
+            let node = &bvh.world.nodes[child.node()];
             let (mut bits, enter) = ray.test_boxes(&node.planes, L::F::splat(end));
             if bits == 0 {
                 break;
@@ -137,7 +144,7 @@ fn intersect_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, stack: &mut Stack,
             }
             child = first.child;
         }
-        if child.is_leaf() && leaf::intersect(&bvh.leaves, child, ray, nearest) {
+        if child.is_leaf() && leaf::intersect(&bvh.world.leaves, child, ray, asked, nearest) {
             end = box_end(nearest.t);
         }
         child = loop {
@@ -176,36 +183,37 @@ impl Kernel for Occluded<'_> {
             return;
         }
         let mut stack = Stack::new();
-        let mut lanes = RayLanes::<L>::new(self.rays, 0, &self.bvh.bounds);
+        let mut lanes = RayLanes::<L>::new(self.rays, 0, &self.bvh.world.bounds);
         let mut stored = [[0.0; WIDTH]; 18];
         lanes.store(&mut stored);
         for (i, out) in self.occluded[..self.n].iter_mut().enumerate() {
             let lane = i % WIDTH;
             if lane == 0 {
-                lanes = RayLanes::new(self.rays, i, &self.bvh.bounds);
+                lanes = RayLanes::new(self.rays, i, &self.bvh.world.bounds);
                 lanes.store(&mut stored);
             }
             *out = 0;
             if lanes.valid >> lane & 1 == 1 {
                 let ray = SingleRay::<L>::new(&stored, lane, lanes.shape(lane));
-                *out = u8::from(occluded_one(self.bvh, &ray, &mut stack, self.rays.t_max[i]));
+                let asked = Asked { filter: self.bvh.filter.as_deref(), key: self.rays.key[i], instance: 0 };
+                *out = u8::from(occluded_one(self.bvh, &ray, &asked, &mut stack, self.rays.t_max[i]));
             }
         }
     }
 }
 
 #[inline(always)]
-fn occluded_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, stack: &mut Stack, t_max: f32) -> bool {
+fn occluded_one<L: Lanes>(bvh: &WideBvh, ray: &SingleRay<L>, asked: &Asked<'_>, stack: &mut Stack, t_max: f32) -> bool {
     let end = L::F::splat(box_end(t_max));
     stack.len = 0;
     let mut child = Child::inner(0);
     loop {
         if child.is_leaf() {
-            if leaf::occluded(&bvh.leaves, child, ray, t_max) {
+            if leaf::occluded(&bvh.world.leaves, child, ray, asked, t_max) {
                 return true;
             }
         } else {
-            let node = &bvh.nodes[child.node()];
+            let node = &bvh.world.nodes[child.node()];
             let (mut bits, _) = ray.test_boxes(&node.planes, end);
             while bits != 0 {
                 let i = bits.trailing_zeros() as usize % WIDTH;

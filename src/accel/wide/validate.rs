@@ -1,17 +1,17 @@
 //! Checks of a finished tree, for tests and debug builds.
 
-use super::WideBvh;
-use super::node::{Child, Node, WIDTH};
-use crate::accel::Triangles;
+use super::Tree;
+use super::node::{Child, FILTERED, Node, WIDTH};
+use super::source::Source;
 use crate::accel::woop::can_be_hit;
 
 /// What is wrong with the tree, if anything: every triangle that can be hit is in exactly one leaf, every box contains
 /// what lies below it, and the depth is the stated one.
-pub fn validate(bvh: &WideBvh, triangles: &Triangles) -> Result<(), String> {
-    let mut seen = vec![0u32; triangles.indices.len()];
-    let depth = visit(bvh, triangles, &mut seen, 0, [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]])?;
-    if depth != bvh.depth {
-        return Err(format!("depth is {depth}, not {}", bvh.depth));
+pub fn validate(tree: &Tree, triangles: &Source<'_>) -> Result<(), String> {
+    let mut seen = vec![0u32; triangles.len()];
+    let depth = visit(tree, triangles, &mut seen, 0, [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]])?;
+    if depth != tree.depth {
+        return Err(format!("depth is {depth}, not {}", tree.depth));
     }
     for (i, seen) in seen.into_iter().enumerate() {
         let wanted = u32::from(can_be_hit(triangles.corners(i)));
@@ -24,13 +24,13 @@ pub fn validate(bvh: &WideBvh, triangles: &Triangles) -> Result<(), String> {
 
 /// Depth of the subtree at `node`, which must lie in `outer`.
 fn visit(
-    bvh: &WideBvh,
-    triangles: &Triangles,
+    tree: &Tree,
+    triangles: &Source<'_>,
     seen: &mut [u32],
     node: usize,
     outer: [[f32; 3]; 2],
 ) -> Result<usize, String> {
-    let Node { planes, children, count } = &bvh.nodes[node];
+    let Node { planes, children, count } = &tree.nodes[node];
     let mut depth = 0;
     for (lane, &child) in children[..*count as usize].iter().enumerate() {
         let corner = |row: usize| [0, 1, 2].map(|axis| planes[(row + axis) * WIDTH + lane]);
@@ -39,23 +39,23 @@ fn visit(
             return Err(format!("node {node} lane {lane}: {bounds:?} is not inside {outer:?}"));
         }
         if child.is_leaf() {
-            visit_leaf(bvh, triangles, seen, child, bounds)?;
+            visit_leaf(tree, triangles, seen, child, bounds)?;
         } else {
-            depth = depth.max(visit(bvh, triangles, seen, child.node(), bounds)?);
+            depth = depth.max(visit(tree, triangles, seen, child.node(), bounds)?);
         }
     }
     Ok(depth + 1)
 }
 
 fn visit_leaf(
-    bvh: &WideBvh,
-    triangles: &Triangles,
+    tree: &Tree,
+    triangles: &Source<'_>,
     seen: &mut [u32],
     leaf: Child,
     bounds: [[f32; 3]; 2],
 ) -> Result<(), String> {
     for i in 0..leaf.count() {
-        let primitive = bvh.leaves.primitive(leaf, i) as usize;
+        let primitive = (tree.leaves.word(leaf, i) & !FILTERED) as usize;
         *seen.get_mut(primitive).ok_or(format!("{leaf:?} names triangle {primitive}"))? += 1;
         let corners = triangles.corners(primitive).map(|corner| corner.to_array());
         if let Some(corner) = corners.into_iter().find(|&corner| !contains(bounds, corner)) {

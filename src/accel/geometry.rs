@@ -1,0 +1,366 @@
+//! What rays can hit, as every backend is built from it.
+//!
+//! Ids: `primitive` numbers all triangles and shapes of the prepared scene, whatever object they belong to; `instance` is
+//! 0 for the world and i + 1 for placement i. What the numbers mean is `render::prepare`'s and shading's business.
+
+use super::Triangles;
+use glam::{DMat3, DVec3, Vec3};
+use std::sync::Arc;
+
+/// Everything rays can hit.
+#[derive(Clone, Default)]
+pub struct Geometry {
+    /// What lies in the prepared space itself: instance 0.
+    pub world: Object,
+    /// What is placed, each in a space of its own.
+    pub objects: Vec<Object>,
+    /// Where objects are: instance i + 1 is placement i.
+    pub placements: Vec<Placement>,
+    /// Decides about hits on filtered parts; needed if there are any.
+    pub filter: Option<Arc<dyn HitFilter>>,
+}
+
+/// Things in one coordinate space.
+#[derive(Clone, Default)]
+pub struct Object {
+    /// Triangles.
+    pub parts: Vec<Part>,
+    /// Exact shapes, each with its primitive number.
+    pub shapes: Vec<(Arc<dyn Shape>, u32)>,
+}
+
+/// Triangles of one kind. A scene has few parts; splitting one up further gains nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Part {
+    /// Triangles with their vertices at time 0.
+    pub triangles: Triangles,
+    /// Vertices at later times, evenly spaced up to time 1, each as many as at time 0; empty for what does not move.
+    /// In between vertices move linearly.
+    pub later: Vec<Vec<[f32; 3]>>,
+    /// The primitive numbers of the triangles.
+    pub primitives: Primitives,
+    /// Whether the geometry's filter is asked about hits.
+    pub filtered: bool,
+}
+
+/// Numbers of a part's triangles, ascending.
+#[derive(Clone, Debug)]
+pub enum Primitives {
+    /// Consecutive from here.
+    From(u32),
+    /// One for each triangle.
+    Each(Vec<u32>),
+}
+
+impl Default for Primitives {
+    fn default() -> Self {
+        Self::From(0)
+    }
+}
+
+impl Primitives {
+    /// The number of triangle `i` of the part.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> u32 {
+        match self {
+            Self::From(first) => first + i as u32,
+            Self::Each(numbers) => numbers[i],
+        }
+    }
+}
+
+/// An object placed in the prepared space.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    /// Index among the objects.
+    pub object: u32,
+    /// Prepared space from object space at evenly spaced times over [0, 1], never empty; between them the elements are
+    /// interpolated linearly. Invertible at every time (see [`Affine::is_usable`]).
+    pub keys: Vec<Affine>,
+}
+
+/// An affine map: three columns and the translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Affine {
+    /// Images of the axes.
+    pub columns: [Vec3; 3],
+    /// Image of the origin.
+    pub translation: Vec3,
+}
+
+impl Affine {
+    /// Leaves everything where it is.
+    pub const IDENTITY: Self = Self { columns: [Vec3::X, Vec3::Y, Vec3::Z], translation: Vec3::ZERO };
+
+    /// Where `p` goes. Plain IEEE operations in a fixed order.
+    #[inline(always)]
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        self.vector(p) + self.translation
+    }
+
+    /// Where the vector `v` goes.
+    #[inline(always)]
+    pub fn vector(&self, v: Vec3) -> Vec3 {
+        self.columns[0] * v.x + self.columns[1] * v.y + self.columns[2] * v.z
+    }
+
+    /// The map between `self` (`s` = 0) and `other` (`s` = 1), by elements; exactly `self` where both are equal.
+    pub fn lerp(&self, other: &Self, s: f32) -> Self {
+        let mix = |a: Vec3, b: Vec3| a + (b - a) * s;
+        Self {
+            columns: [0, 1, 2].map(|i| mix(self.columns[i], other.columns[i])),
+            translation: mix(self.translation, other.translation),
+        }
+    }
+
+    /// The inverse, by cofactors in f64; `None` where it has elements that f32 cannot hold.
+    pub fn inverse(&self) -> Option<Self> {
+        let [x, y, z] = self.columns.map(Vec3::as_dvec3);
+        let determinant = x.dot(y.cross(z));
+        let rows = [y.cross(z), z.cross(x), x.cross(y)].map(|row| row / determinant);
+        let inverse = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
+        let translation = -(inverse * self.translation.as_dvec3());
+        let inverse = Self {
+            columns: [inverse.x_axis, inverse.y_axis, inverse.z_axis].map(DVec3::as_vec3),
+            translation: translation.as_vec3(),
+        };
+        inverse.is_finite().then_some(inverse)
+    }
+
+    /// Whether it is finite and has a finite inverse.
+    pub fn is_usable(&self) -> bool {
+        self.is_finite() && self.inverse().is_some()
+    }
+
+    fn is_finite(&self) -> bool {
+        self.columns.iter().all(|c| c.is_finite()) && self.translation.is_finite()
+    }
+}
+
+impl Placement {
+    /// Whether it moves.
+    pub fn moves(&self) -> bool {
+        self.keys.len() > 1
+    }
+
+    /// The map at `time` in [0, 1].
+    pub fn at(&self, time: f32) -> Affine {
+        match &self.keys[..] {
+            [only] => *only,
+            keys => {
+                let (k, s) = segment(keys.len(), time);
+                keys[k].lerp(&keys[k + 1], s)
+            }
+        }
+    }
+}
+
+/// The segment between two of `keys` (at least two) keys in which `time` lies, and where in it, in [0, 1].
+#[inline(always)]
+pub fn segment(keys: usize, time: f32) -> (usize, f32) {
+    let at = time.clamp(0.0, 1.0) * (keys - 1) as f32;
+    let k = (at as usize).min(keys - 2);
+    (k, at - k as f32)
+}
+
+/// A ray and one crossing of it with a filtered triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate {
+    /// The ray's [`key`](super::RayBatch::key).
+    pub key: u32,
+    /// 0 for the world, i + 1 for placement i.
+    pub instance: u32,
+    /// Primitive number.
+    pub primitive: u32,
+    /// Barycentric weight of the second vertex.
+    pub u: f32,
+    /// Barycentric weight of the third vertex.
+    pub v: f32,
+}
+
+/// Decides which crossings with filtered triangles are hits: surfaces that are not all there. A pure function, since every
+/// backend asks in another order and about other crossings.
+pub trait HitFilter: Send + Sync {
+    /// Whether the ray is stopped there.
+    fn stops(&self, candidate: &Candidate) -> bool;
+}
+
+/// A ray in an exact shape's space.
+#[derive(Clone, Copy, Debug)]
+pub struct ShapeRay {
+    /// Origin.
+    pub origin: Vec3,
+    /// Direction of any length but 0; t counts in its lengths.
+    pub direction: Vec3,
+    /// End of the ray.
+    pub t_max: f32,
+    /// In [0, 1].
+    pub time: f32,
+}
+
+/// Where a ray meets an exact shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShapeHit {
+    /// In (0, `t_max`).
+    pub t: f32,
+    /// First surface parameter.
+    pub u: f32,
+    /// Second surface parameter.
+    pub v: f32,
+}
+
+/// Something that is no triangle mesh.
+pub trait Shape: Send + Sync {
+    /// Low and high corner of what it occupies at any time.
+    fn bounds(&self) -> [[f32; 3]; 2];
+
+    /// The nearest crossing with t in (0, `t_max`).
+    fn intersect(&self, ray: &ShapeRay) -> Option<ShapeHit>;
+
+    /// Whether there is any; must agree with [`Shape::intersect`].
+    fn occludes(&self, ray: &ShapeRay) -> bool {
+        self.intersect(ray).is_some()
+    }
+}
+
+impl From<Triangles> for Part {
+    fn from(triangles: Triangles) -> Self {
+        Self { triangles, ..Self::default() }
+    }
+}
+
+impl From<&Triangles> for Geometry {
+    fn from(triangles: &Triangles) -> Self {
+        triangles.clone().into()
+    }
+}
+
+impl From<Triangles> for Geometry {
+    fn from(triangles: Triangles) -> Self {
+        Self { world: Object { parts: vec![triangles.into()], shapes: Vec::new() }, ..Self::default() }
+    }
+}
+
+impl Part {
+    /// The corners of triangle `i` at `time` in [0, 1]; exactly those of time 0 where it does not move.
+    pub fn corners_at(&self, i: usize, time: f32) -> [Vec3; 3] {
+        let start = self.triangles.corners(i);
+        if self.later.is_empty() {
+            return start;
+        }
+        let (k, s) = segment(self.later.len() + 1, time);
+        let before = if k == 0 { start } else { self.corners_of_key(k, i) };
+        let after = self.corners_of_key(k + 1, i);
+        [0, 1, 2].map(|c| before[c] + (after[c] - before[c]) * s)
+    }
+
+    /// The corners of triangle `i` at key `k`.
+    pub fn corners_of_key(&self, k: usize, i: usize) -> [Vec3; 3] {
+        if k == 0 {
+            return self.triangles.corners(i);
+        }
+        self.triangles.indices[i].map(|v| Vec3::from_array(self.later[k - 1][v as usize]))
+    }
+
+    /// Times at which vertices are given: 1 for what does not move.
+    pub fn keys(&self) -> usize {
+        1 + self.later.len()
+    }
+}
+
+impl Object {
+    /// Low and high corner of everything at every time; `None` if there is nothing.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        let mut bounds: Option<[Vec3; 2]> = None;
+        let mut add = |p: Vec3| {
+            let [low, high] = bounds.get_or_insert([p; 2]);
+            (*low, *high) = (low.min(p), high.max(p));
+        };
+        for part in &self.parts {
+            part.triangles.positions_in_use().for_each(&mut add);
+            for later in &part.later {
+                part.triangles.indices.as_flattened().iter().for_each(|&v| add(Vec3::from_array(later[v as usize])));
+            }
+        }
+        for (shape, _) in &self.shapes {
+            shape.bounds().map(Vec3::from_array).into_iter().for_each(&mut add);
+        }
+        bounds
+    }
+}
+
+impl Placement {
+    /// Low and high corner, in the prepared space, of an object with the bounds `object` over all times; rounded
+    /// outwards.
+    pub fn bounds(&self, object: [Vec3; 2]) -> [Vec3; 2] {
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for key in &self.keys {
+            for corner in 0..8 {
+                let pick = |axis: usize| object[corner >> axis & 1][axis];
+                let p = key.point(Vec3::new(pick(0), pick(1), pick(2)));
+                (low, high) = (low.min(p), high.max(p));
+            }
+        }
+        // Four roundings of terms up to the largest of them; elements are interpolated linearly, so corners between keys
+        // lie between their places at the keys.
+        let size = |key: &Affine| {
+            let extent = object[0].abs().max(object[1].abs());
+            (0..3).fold(key.translation.abs(), |sum, i| sum + key.columns[i].abs() * extent[i])
+        };
+        let pad = self.keys.iter().map(size).fold(Vec3::ZERO, Vec3::max) * (8.0 * f32::EPSILON);
+        [(low - pad).map(f32::next_down), (high + pad).map(f32::next_up)]
+    }
+}
+
+impl Geometry {
+    /// Low and high corner of everything at every time; `None` if there is nothing.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        let objects: Vec<_> = self.objects.iter().map(Object::bounds).collect();
+        let placed = self.placements.iter().filter_map(|p| Some(p.bounds(objects[p.object as usize]?)));
+        self.world.bounds().into_iter().chain(placed).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+    }
+
+    /// Triangles held, each object once.
+    pub fn triangle_count(&self) -> usize {
+        let of = |object: &Object| object.parts.iter().map(|part| part.triangles.indices.len()).sum::<usize>();
+        of(&self.world) + self.objects.iter().map(of).sum::<usize>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_fall_into_the_segment_between_their_keys() {
+        assert_eq!(segment(2, 0.0), (0, 0.0));
+        assert_eq!(segment(2, 1.0), (0, 1.0));
+        assert_eq!(segment(3, 0.5), (1, 0.0));
+        assert_eq!(segment(3, 0.75), (1, 0.5));
+        assert_eq!(segment(5, 7.0), (3, 1.0));
+        assert_eq!(segment(5, f32::NAN.max(0.0)), (0, 0.0));
+    }
+
+    #[test]
+    fn an_inverse_undoes_its_map_and_a_singular_map_has_none() {
+        let map = Affine {
+            columns: [Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.0, -3.0, 1.0), Vec3::new(0.5, 0.0, 2.0)],
+            translation: Vec3::new(10.0, -20.0, 5.0),
+        };
+        let p = Vec3::new(0.3, -0.7, 4.0);
+        assert!((map.inverse().unwrap().point(map.point(p)) - p).length() < 1e-5);
+        let flat = Affine { columns: [Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], translation: Vec3::ZERO };
+        assert!(!flat.is_usable());
+        let tiny = Affine { columns: [Vec3::X * 1e-20, Vec3::Y * 1e-20, Vec3::Z * 1e-20], translation: Vec3::ONE };
+        assert!(tiny.is_usable());
+    }
+
+    #[test]
+    fn what_has_equal_keys_stands_exactly_still() {
+        let map = Affine { columns: [Vec3::X * 0.1, Vec3::Y * 0.7, Vec3::Z * 1.3], translation: Vec3::splat(0.3) };
+        let placement = Placement { object: 0, keys: vec![map, map, map] };
+        for i in 0..100 {
+            assert_eq!(placement.at(i as f32 / 99.0), map);
+        }
+    }
+}
