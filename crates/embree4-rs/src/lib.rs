@@ -50,6 +50,7 @@ pub use device::Device;
 pub use error::{Error, ErrorCode, LoadError, Reason, Refusal, Version};
 pub use filter::{Candidate, Filter};
 pub use geometry::{Affine, Geometry, GeometryId, InstanceArrayGeometry, InstanceGeometry, TriangleGeometry};
+pub use geometry::{UserGeometry, UserHit, UserShapes};
 pub use library::Library;
 pub use probe::HitLayout;
 pub use query::Coherence;

@@ -9,6 +9,7 @@ use std::mem::{align_of, offset_of, size_of};
 use std::ptr::null_mut;
 
 use crate::filter::FilterFunction;
+use crate::geometry::{BoundsFunction, UserFunction};
 use crate::ray::{Ray, RayHit, RayHitPacket, RayPacket};
 
 /// What an `RTCDevice` points to.
@@ -55,6 +56,7 @@ pub(crate) mod query_flag {
 }
 
 pub(crate) const GEOMETRY_TYPE_TRIANGLE: c_int = 0;
+pub(crate) const GEOMETRY_TYPE_USER: c_int = 120;
 pub(crate) const GEOMETRY_TYPE_INSTANCE: c_int = 121;
 pub(crate) const GEOMETRY_TYPE_INSTANCE_ARRAY: c_int = 122;
 pub(crate) const BUFFER_TYPE_INDEX: c_int = 0;
@@ -211,6 +213,11 @@ function_table! {
             fn(*mut RtcGeometry, Option<FilterFunction>);
         set_geometry_occluded_filter_function = "rtcSetGeometryOccludedFilterFunction":
             fn(*mut RtcGeometry, Option<FilterFunction>);
+        set_geometry_user_primitive_count = "rtcSetGeometryUserPrimitiveCount": fn(*mut RtcGeometry, u32);
+        set_geometry_bounds_function = "rtcSetGeometryBoundsFunction":
+            fn(*mut RtcGeometry, Option<BoundsFunction>, *mut c_void);
+        set_geometry_intersect_function = "rtcSetGeometryIntersectFunction": fn(*mut RtcGeometry, Option<UserFunction>);
+        set_geometry_occluded_function = "rtcSetGeometryOccludedFunction": fn(*mut RtcGeometry, Option<UserFunction>);
         commit_geometry = "rtcCommitGeometry": fn(*mut RtcGeometry);
 
         new_scene = "rtcNewScene": fn(*mut RtcDevice) -> *mut RtcScene;

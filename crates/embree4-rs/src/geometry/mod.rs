@@ -3,9 +3,12 @@
 
 mod instance;
 mod triangles;
+mod user;
 
 pub use instance::{Affine, InstanceArrayGeometry, InstanceGeometry};
 pub use triangles::TriangleGeometry;
+pub(crate) use user::{BoundsFunction, UserFunction};
+pub use user::{UserGeometry, UserHit, UserShapes};
 
 use std::ffi::c_int;
 use std::ptr::NonNull;
@@ -29,6 +32,8 @@ pub enum Geometry {
     Instance(InstanceGeometry),
     /// Another scene at many places.
     InstanceArray(InstanceArrayGeometry),
+    /// Shapes that the program intersects itself.
+    User(UserGeometry),
 }
 
 impl Geometry {
@@ -37,6 +42,7 @@ impl Geometry {
             Self::Triangles(mesh) => &mesh.handle,
             Self::Instance(instance) => &instance.handle,
             Self::InstanceArray(instances) => &instances.handle,
+            Self::User(shapes) => &shapes.handle,
         }
     }
 
@@ -46,6 +52,7 @@ impl Geometry {
             Self::Triangles(mesh) => mesh.has_filter(),
             Self::Instance(instance) => instance.scene().has_callbacks(),
             Self::InstanceArray(instances) => instances.scene().has_callbacks(),
+            Self::User(_) => true,
         }
     }
 
@@ -70,6 +77,12 @@ impl From<InstanceGeometry> for Geometry {
 impl From<InstanceArrayGeometry> for Geometry {
     fn from(instances: InstanceArrayGeometry) -> Self {
         Self::InstanceArray(instances)
+    }
+}
+
+impl From<UserGeometry> for Geometry {
+    fn from(shapes: UserGeometry) -> Self {
+        Self::User(shapes)
     }
 }
 
