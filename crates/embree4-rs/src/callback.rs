@@ -76,8 +76,8 @@ impl Rows {
         Self { first: first.cast(), width: width as usize }
     }
 
-    /// The rows from `row` on.
-    pub(crate) fn from_row(self, row: usize) -> Self {
+    /// The rows from `row` on, to be counted from 0 again.
+    pub(crate) fn below(self, row: usize) -> Self {
         // SAFETY: the rows are there, as the caller of `new` says.
         Self { first: unsafe { self.first.add(row * self.width) }, ..self }
     }
@@ -186,7 +186,7 @@ mod tests {
             let rows = unsafe { Rows::new(words.as_mut_ptr(), width) };
             let last = width as usize - 1;
             assert_eq!(rows.word(ray_row::ID, last), 10 * width + width - 1);
-            assert_eq!(rows.from_row(3).word(2, 0), 5 * width);
+            assert_eq!(rows.below(3).word(2, 0), 5 * width);
             rows.set_number(ray_row::T_MAX, last, 2.5);
             assert_eq!(rows.number(ray_row::T_MAX, last), 2.5);
 

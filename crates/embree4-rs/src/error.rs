@@ -221,6 +221,13 @@ pub enum Error {
         /// What is wrong with it.
         problem: &'static str,
     },
+    /// The build needs more memory than [`Device::set_memory_limit`](crate::Device::set_memory_limit) allows.
+    MemoryLimit {
+        /// The C function that failed.
+        call: &'static str,
+        /// The limit, in bytes.
+        limit: usize,
+    },
     /// The scene to be instanced contains instances itself.
     SecondLevel,
 }
@@ -256,6 +263,9 @@ impl fmt::Display for Error {
             ),
             Self::Matrix { matrix, instance, key, problem } => {
                 write!(f, "the matrix of instance {instance} at time key {key}, columns {matrix:?}, {problem}")
+            }
+            Self::MemoryLimit { call, limit } => {
+                write!(f, "Embree: {call}: out of memory: the device may hold {limit} bytes; raise the limit")
             }
             Self::SecondLevel => write!(
                 f,

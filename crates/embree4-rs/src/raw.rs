@@ -205,6 +205,7 @@ function_table! {
         set_shared_geometry_buffer = "rtcSetSharedGeometryBuffer":
             fn(*mut RtcGeometry, c_int, u32, c_int, *const c_void, usize, usize, usize);
         set_geometry_time_step_count = "rtcSetGeometryTimeStepCount": fn(*mut RtcGeometry, u32);
+        set_geometry_build_quality = "rtcSetGeometryBuildQuality": fn(*mut RtcGeometry, c_int);
         set_geometry_mask = "rtcSetGeometryMask": fn(*mut RtcGeometry, u32);
         set_geometry_instanced_scene = "rtcSetGeometryInstancedScene": fn(*mut RtcGeometry, *mut RtcScene);
         set_geometry_transform = "rtcSetGeometryTransform": fn(*mut RtcGeometry, u32, c_int, *const c_void);
@@ -227,6 +228,7 @@ function_table! {
         attach_geometry = "rtcAttachGeometry": fn(*mut RtcScene, *mut RtcGeometry) -> u32;
         attach_geometry_by_id = "rtcAttachGeometryByID": fn(*mut RtcScene, *mut RtcGeometry, u32);
         commit_scene = "rtcCommitScene": fn(*mut RtcScene);
+        join_commit_scene = "rtcJoinCommitScene": fn(*mut RtcScene);
         get_scene_bounds = "rtcGetSceneBounds": fn(*mut RtcScene, *mut Bounds);
 
         intersect1 = "rtcIntersect1": fn(*mut RtcScene, *mut RayHit, *mut QueryArguments);

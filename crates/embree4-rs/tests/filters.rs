@@ -186,7 +186,7 @@ fn a_filter_acts_on_a_moving_mesh() {
     let risen: Vec<[f32; 3]> = positions.iter().map(|&[x, y, z]| [x, y, z + 0.5]).collect();
     let keys = vec![positions, risen];
     let mut mesh = TriangleGeometry::moving(&device, keys.clone(), indices.clone()).unwrap();
-    mesh.set_filter(Arc::new(By(|c: &Candidate| c.primitive % 2 == 0))).unwrap();
+    mesh.set_filter(Arc::new(By(|c: &Candidate| c.primitive.is_multiple_of(2)))).unwrap();
     let even = indices.into_iter().step_by(2).collect();
     let expected = scene(&device, [TriangleGeometry::moving(&device, keys, even).unwrap().into()]);
     let rays = Numbers(5).rays(2000);

@@ -192,10 +192,12 @@ fn any_hit_queries_ask_occluded() {
     assert!(common::Batch::new(&rays).occluded(&scene).iter().all(|&bit| bit == 0));
 }
 
+type BoxOf = fn() -> Option<[[f32; 3]; 2]>;
+
 /// Spheres with a fault: bounds of shape 1 are what `bounds` says, shape 2 panics when it is met.
 struct Faulty {
     spheres: Arc<Spheres>,
-    bounds: fn() -> Option<[[f32; 3]; 2]>,
+    bounds: BoxOf,
 }
 
 impl UserShapes for Faulty {
@@ -224,7 +226,7 @@ fn down(x: f32) -> Ray {
 #[test]
 fn shapes_with_boxes_that_are_none_are_never_hit() {
     let Some(device) = device("threads=1") else { return };
-    let wild: [fn() -> Option<[[f32; 3]; 2]>; 6] = [
+    let wild: [BoxOf; 6] = [
         || None,
         || Some([[f32::NAN; 3], [1.0; 3]]),
         || Some([[0.0; 3], [f32::INFINITY; 3]]),

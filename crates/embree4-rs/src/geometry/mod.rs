@@ -139,6 +139,14 @@ impl GeometryHandle {
         self.commit()
     }
 
+    /// How the geometry's own tree is built, in a scene that gives it one.
+    pub(crate) fn set_quality(&self, quality: c_int) -> Result<(), Error> {
+        // SAFETY: the handle is valid, and its owner is about to attach it.
+        unsafe { (self.api().set_geometry_build_quality)(self.raw(), quality) };
+        self.device.check("rtcSetGeometryBuildQuality")?;
+        self.commit()
+    }
+
     /// Ends a round of changes.
     fn commit(&self) -> Result<(), Error> {
         // SAFETY: the handle is valid and nobody else has it yet.

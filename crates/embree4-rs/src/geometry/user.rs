@@ -225,7 +225,7 @@ unsafe extern "C" fn ask_bounds(arguments: *const BoundsArguments) {
 unsafe extern "C" fn ask_intersect(arguments: *const UserArguments) {
     // SAFETY: as the caller promises.
     let (arguments, data, lanes, rays) = unsafe { unpack(arguments) };
-    let hits = rays.from_row(ray_row::COUNT);
+    let hits = rays.below(ray_row::COUNT);
     guarded((), || {
         for lane in lanes.asked() {
             let ray = ray_in(rays, lane);
