@@ -21,13 +21,16 @@
 //! # }
 //! ```
 //!
+//! The README shows instances, filters, motion and batches together.
+//!
 //! # What keeps it sound
 //!
 //! - Only a [`CommittedScene`] has queries, and it no longer changes.
-//! - What Embree keeps pointers to is owned by the geometry, and a scene owns its geometries.
+//! - What Embree keeps pointers to is owned by the geometry, and a scene owns its geometries and what they instance.
 //! - Indices are checked before Embree sees them.
 //! - Hit structs have room for longer layouts than are accepted.
-//! - Rays that are not finite never reach Embree; they miss.
+//! - Rays that are not finite, or outside of the shutter, never reach Embree; they miss.
+//! - No panic of a [`Filter`] or of [`UserShapes`] unwinds into C++.
 //! - The floating-point environment of the calling thread is as before after every call.
 
 #![deny(unsafe_op_in_unsafe_fn)]

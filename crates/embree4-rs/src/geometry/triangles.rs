@@ -113,7 +113,7 @@ impl TriangleGeometry {
     }
 
     /// Lets only those hits of this mesh count that `filter` accepts. A filter that accepts everything costs
-    /// some 5 to 10 % of the speed in this mesh, and nothing in others.
+    /// rays in this mesh 5 % of their speed one by one, 10 to 15 % in packets, and others nothing.
     pub fn set_filter(&mut self, filter: Arc<dyn Filter>) -> Result<(), Error> {
         let device = &self.handle.device;
         let data = Arc::new(FilterData { filter, layout: device.library().hit_layout() });
