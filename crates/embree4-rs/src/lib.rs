@@ -16,7 +16,7 @@
 //! let scene = scene.commit()?;
 //!
 //! let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-//! assert_eq!(scene.intersect1(&ray).map(|hit| hit.t), Some(1.0));
+//! assert!(scene.intersect1(&ray).is_some_and(|hit| (hit.t - 1.0).abs() < 1e-6));
 //! # Ok(())
 //! # }
 //! ```

@@ -176,6 +176,11 @@ impl Hits {
     }
 }
 
+/// `x` without the last digits, in which instruction sets differ.
+pub fn rounded(x: f32) -> f32 {
+    (1e4 * x).round() / 1e4
+}
+
 /// Whether two hits are the same thing at the same place, up to the rounding of different kernels; `u` and
 /// `v` count in edges, which are a tenth or less of what `t` counts in.
 pub fn is_same(a: &Hit, b: &Hit) -> bool {
