@@ -79,7 +79,7 @@ pub(crate) type MemoryFunction = unsafe extern "C" fn(*mut c_void, isize, bool) 
 
 /// `RTCBounds`: an axis-aligned box, each corner padded to 16 bytes.
 #[repr(C, align(16))]
-#[derive(Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Bounds {
     pub(crate) lower: [f32; 3],
     pub(crate) align0: f32,

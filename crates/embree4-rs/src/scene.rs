@@ -118,14 +118,11 @@ impl Scene {
     ///
     /// Embree builds on threads of its own (`threads` in the device's configuration) and this one.
     /// It switches flush-to-zero on in this thread meanwhile, and back before it returns.
-    ///
-    /// A panic in a [`UserShapes::bounds`](crate::UserShapes::bounds) comes out of here.
     pub fn commit(self) -> Result<CommittedScene, Error> {
         let device = &self.handle.device;
         device.clear_error();
         // SAFETY: the scene handle is valid, and `self` is the only one to use it.
         unsafe { (device.api().commit_scene)(self.handle.raw()) };
-        self.resume_build_panic();
         device.check("rtcCommitScene")?;
         self.committed()
     }
@@ -151,7 +148,6 @@ impl Scene {
             results.extend(others.into_iter().map(|thread| thread.join().unwrap_or_else(|p| resume_unwind(p))));
             results
         });
-        self.resume_build_panic();
         results.into_iter().collect::<Result<Vec<()>, Error>>()?;
         self.committed()
     }
@@ -165,17 +161,6 @@ impl Scene {
         device.check("rtcGetSceneBounds")?;
         let is_empty = (0..3).any(|axis| bounds.lower[axis] > bounds.upper[axis]);
         Ok(CommittedScene { handle: self.handle, bounds: (!is_empty).then_some([bounds.lower, bounds.upper]) })
-    }
-}
-
-impl Scene {
-    /// Goes on with a panic that a callback of the build has left behind.
-    fn resume_build_panic(&self) {
-        for geometry in &self.handle.geometries {
-            if let Geometry::User(shapes) = geometry {
-                shapes.resume_build_panic();
-            }
-        }
     }
 }
 

@@ -244,7 +244,7 @@ fn shapes_with_boxes_that_are_none_are_never_hit() {
 }
 
 #[test]
-fn a_panic_in_a_shape_comes_out_of_the_query_and_one_in_bounds_out_of_commit() {
+fn a_panic_in_a_shape_comes_out_of_the_query_and_one_in_bounds_out_of_new() {
     for config in ["threads=1", "threads=2"] {
         let Some(device) = device(config) else { return };
         let bounds = || Some([[2.0, -1.0, -1.0], [4.0, 1.0, 1.0]]);
@@ -258,10 +258,8 @@ fn a_panic_in_a_shape_comes_out_of_the_query_and_one_in_bounds_out_of_commit() {
             assert!(query(&scene, down(0.0)));
         }
 
-        let mut scene = Scene::new(&device, SceneFlags::ROBUST, BuildQuality::Medium).unwrap();
-        let bounds = || panic!("no box");
-        scene.attach(shapes(&device, Arc::new(Faulty { spheres: row_of_spheres(), bounds }))).unwrap();
-        let payload = catch_unwind(AssertUnwindSafe(|| scene.commit())).unwrap_err();
+        let shapes = Arc::new(Faulty { spheres: row_of_spheres(), bounds: || panic!("no box") });
+        let payload = catch_unwind(AssertUnwindSafe(|| UserGeometry::new(&device, shapes))).unwrap_err();
         assert_eq!(payload.downcast_ref::<&str>(), Some(&"no box"));
     }
 }

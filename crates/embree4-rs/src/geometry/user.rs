@@ -1,10 +1,8 @@
 //! User geometry: shapes that Embree only knows the boxes of, and a program intersects itself.
 
-use std::any::Any;
 use std::ffi::{c_int, c_void};
 use std::mem::{align_of, offset_of, size_of};
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::{GeometryHandle, check_count, check_keys};
 use crate::callback::{Lanes, Rows, guarded, hit_row, ray_row};
@@ -19,11 +17,10 @@ const MAX_SHAPES: usize = u32::MAX as usize - 1;
 
 /// Shapes that Embree puts in its tree by their boxes and asks about single rays.
 ///
-/// All methods may be called from any thread, `bounds` by the threads that build, the others by those that
-/// query. A panic in a query is treated as a [`Filter`](crate::Filter)'s is; one in `bounds` comes out of
-/// [`Scene::commit`](crate::Scene::commit).
+/// [`UserGeometry::new`] asks for everything but hits, once and in its own thread. Hits are asked for in the threads
+/// that query; a panic there is treated as a [`Filter`](crate::Filter)'s is.
 pub trait UserShapes: Send + Sync {
-    /// How many shapes there are. Asked once.
+    /// How many shapes there are.
     fn len(&self) -> usize;
 
     /// Whether there are none.
@@ -32,14 +29,14 @@ pub trait UserShapes: Send + Sync {
     }
 
     /// At how many equally spaced times from 0 to 1 boxes are asked for; in between Embree interpolates them, so
-    /// the boxes of a shape that does not move along a line must have room. Asked once; 1 for shapes at rest.
+    /// the boxes of a shape that does not move along a line must have room. 1 for shapes at rest.
     fn time_steps(&self) -> usize {
         1
     }
 
     /// The lower and the upper corner of a box around shape `primitive` at `time`, one of
     /// [`UserShapes::time_steps`] times (0 if there is one). The shape is never hit if there is none at any
-    /// time, or one that is not finite, is beyond 1.844e18 or upside down. May be asked more than once.
+    /// time, or one that is not finite, is beyond 1.844e18 or upside down.
     fn bounds(&self, primitive: u32, time: f32) -> Option<[[f32; 3]; 2]>;
 
     /// Where `ray` first meets shape `primitive` with `t` in [`t_min`, `t_max`]; a hit outside of that, or a `t`
@@ -82,19 +79,21 @@ struct UserData {
     shapes: Arc<dyn UserShapes>,
     layout: HitLayout,
     time_steps: usize,
-    /// The first panic in `bounds`, which Embree may call in threads of its own.
-    build_panic: Mutex<Option<Box<dyn Any + Send>>>,
+    /// Of all shapes at the first time, at the second, and so on. Found before the build, because Embree asks in
+    /// threads of its own, more than once, and with flush-to-zero on, which Rust code must not run with.
+    boxes: Vec<Bounds>,
 }
 
 impl UserGeometry {
-    /// A geometry of `shapes`. More than `u32::MAX - 1` shapes, or time steps outside of 1 to 129, are an error.
+    /// A geometry of `shapes`. Keeps 32 bytes for each shape and time. More than `u32::MAX - 1` shapes, or time steps outside of 1 to 129, are an error.
     pub fn new(device: &Arc<Device>, shapes: Arc<dyn UserShapes>) -> Result<Self, Error> {
         let (count, time_steps) = (shapes.len(), shapes.time_steps());
         check_count("shapes", count, MAX_SHAPES)?;
         check_keys(time_steps)?;
         let count = u32::try_from(count).expect("the count was checked");
         let layout = device.library().hit_layout();
-        let data = Arc::new(UserData { shapes, layout, time_steps, build_panic: Mutex::new(None) });
+        let boxes = boxes_of(&*shapes, count, time_steps);
+        let data = Arc::new(UserData { shapes, layout, time_steps, boxes });
 
         let handle = GeometryHandle::new(device, GEOMETRY_TYPE_USER)?;
         handle.set_time_steps(time_steps)?;
@@ -122,13 +121,6 @@ impl UserGeometry {
     pub fn set_mask(&mut self, mask: u32) -> Result<(), Error> {
         self.handle.set_mask(mask)
     }
-
-    /// Goes on with the panic of a `bounds` of the build that has just returned, if there was one.
-    pub(crate) fn resume_build_panic(&self) {
-        if let Some(payload) = self.data.take_panic() {
-            resume_unwind(payload);
-        }
-    }
 }
 
 impl std::fmt::Debug for UserGeometry {
@@ -137,25 +129,30 @@ impl std::fmt::Debug for UserGeometry {
     }
 }
 
-impl UserData {
-    fn take_panic(&self) -> Option<Box<dyn Any + Send>> {
-        self.build_panic.lock().unwrap_or_else(PoisonError::into_inner).take()
-    }
+/// The box of a shape that is never hit.
+const NO_BOX: Bounds = Bounds { lower: [f32::INFINITY; 3], align0: 0.0, upper: [f32::NEG_INFINITY; 3], align1: 0.0 };
 
-    /// The box that Embree gets, the empty one for a shape that is never hit.
+/// The boxes of `count` shapes at the first of `time_steps` times, at the second, and so on.
+fn boxes_of(shapes: &dyn UserShapes, count: u32, time_steps: usize) -> Vec<Bounds> {
+    // Embree itself looks at what is beyond 1.844e18; of NaN it sees only some.
+    let is_box = |[lower, upper]: &[[f32; 3]; 2]| {
+        (0..3).all(|axis| lower[axis] <= upper[axis] && lower[axis].is_finite() && upper[axis].is_finite())
+    };
+    let mut boxes = Vec::with_capacity(count as usize * time_steps);
+    for step in 0..time_steps {
+        let time = if time_steps > 1 { step as f32 / (time_steps - 1) as f32 } else { 0.0 };
+        boxes.extend((0..count).map(|primitive| match shapes.bounds(primitive, time).filter(is_box) {
+            Some([lower, upper]) => Bounds { lower, align0: 0.0, upper, align1: 0.0 },
+            None => NO_BOX,
+        }));
+    }
+    boxes
+}
+
+impl UserData {
     fn bounds(&self, primitive: u32, step: u32) -> Bounds {
-        let time = if self.time_steps > 1 { step as f32 / (self.time_steps - 1) as f32 } else { 0.0 };
-        let found = catch_unwind(AssertUnwindSafe(|| self.shapes.bounds(primitive, time)));
-        let corners = found.unwrap_or_else(|payload| {
-            self.build_panic.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(payload);
-            None
-        });
-        // Embree itself looks at what is beyond 1.844e18; of NaN it sees only some.
-        let is_box = |[lower, upper]: &[[f32; 3]; 2]| {
-            (0..3).all(|axis| lower[axis] <= upper[axis] && lower[axis].is_finite() && upper[axis].is_finite())
-        };
-        let [lower, upper] = corners.filter(is_box).unwrap_or([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
-        Bounds { lower, align0: 0.0, upper, align1: 0.0 }
+        let count = self.boxes.len() / self.time_steps;
+        self.boxes.get(step as usize * count + primitive as usize).copied().unwrap_or(NO_BOX)
     }
 }
 
