@@ -36,7 +36,7 @@ fi
 
 # Sees also what Embree reads and writes, with the kernels for AVX2 or less: valgrind has no AVX-512.
 if command -v valgrind >/dev/null; then
-  binaries=$(cargo test -p embree4-rs --lib --tests --no-run 2>&1 | sed -n 's/.*(\(.*\))$/\1/p')
+  binaries=$(cargo test -p embree4-rs --lib --tests --no-run 2>&1 | sed -n 's/^ *Executable .*(\(.*\))$/\1/p')
   status=0
   cd crates/embree4-rs || exit 1
   for binary in $binaries; do
