@@ -17,14 +17,20 @@ thread_local! {
     static LAST_MESSAGE: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
+/// What the memory monitor counts, in bytes.
+struct Memory {
+    held: AtomicIsize,
+    limit: AtomicIsize,
+}
+
 /// An Embree device. Any number of scenes may share one.
 pub struct Device {
     handle: NonNull<RtcDevice>,
     library: Arc<Library>,
     config: String,
     native_width: usize,
-    /// Bytes that Embree holds. Shared because Embree has its address.
-    memory: Arc<AtomicIsize>,
+    /// Shared because Embree has its address.
+    memory: Arc<Memory>,
     /// Held while a call changes the device itself, which Embree does not allow from two threads.
     building: Mutex<()>,
 }
@@ -63,7 +69,7 @@ impl Device {
             library: Arc::clone(library),
             config: config.to_owned(),
             native_width: 4,
-            memory: Arc::new(AtomicIsize::new(0)),
+            memory: Arc::new(Memory { held: AtomicIsize::new(0), limit: AtomicIsize::new(isize::MAX) }),
             building: Mutex::new(()),
         };
         let memory = Arc::as_ptr(&device.memory).cast_mut().cast();
@@ -99,7 +105,16 @@ impl Device {
 
     /// Bytes that Embree has allocated for all scenes of this device: trees, not the arrays that geometries own.
     pub fn memory_bytes(&self) -> usize {
-        usize::try_from(self.memory.load(Ordering::Relaxed)).unwrap_or(0)
+        usize::try_from(self.memory.held.load(Ordering::Relaxed)).unwrap_or(0)
+    }
+
+    /// From now on a build that would let [`Device::memory_bytes`] grow beyond `bytes` fails with
+    /// [`Error::MemoryLimit`] and gives back what it had taken; `usize::MAX`, as at first, is no limit. What is there
+    /// already stays.
+    ///
+    /// Embree takes memory in blocks of up to 2 MiB for each thread, so leave room for some.
+    pub fn set_memory_limit(&self, bytes: usize) {
+        self.memory.limit.store(isize::try_from(bytes).unwrap_or(isize::MAX), Ordering::Relaxed);
     }
 
     /// How many rays the widest packet holds that runs as one on this device: 4, 8 or 16.
@@ -159,6 +174,10 @@ impl Device {
             None => Ok(()),
             Some(code) => {
                 let message = LAST_MESSAGE.with(RefCell::take);
+                if code == ErrorCode::OutOfMemory && message.contains("memory monitor") {
+                    let limit = usize::try_from(self.memory.limit.load(Ordering::Relaxed)).unwrap_or(0);
+                    return Err(Error::MemoryLimit { call, limit });
+                }
                 Err(Error::Embree { call, code, message })
             }
         }
@@ -209,10 +228,39 @@ unsafe extern "C" fn keep_message(_user: *mut c_void, _code: c_int, text: *const
     });
 }
 
-/// Embree's memory monitor: `bytes` more, or fewer if negative. `true` lets it go on.
-unsafe extern "C" fn count_memory(user: *mut c_void, bytes: isize, _post: bool) -> bool {
+/// Embree's memory monitor: `bytes` more, or fewer if negative. `true` lets it go on. `is_done` says that they have
+/// been taken already, too late to refuse them.
+unsafe extern "C" fn count_memory(user: *mut c_void, bytes: isize, is_done: bool) -> bool {
     // SAFETY: `user` is the device's counter, which outlives the device handle.
-    let memory = unsafe { &*user.cast::<AtomicIsize>() };
-    memory.fetch_add(bytes, Ordering::Relaxed);
-    true
+    let memory = unsafe { &*user.cast::<Memory>() };
+    memory.count(bytes, is_done)
+}
+
+impl Memory {
+    /// Counts `bytes` and says whether Embree may go on; bytes that are refused are not counted, because Embree then
+    /// does not take them.
+    fn count(&self, bytes: isize, is_done: bool) -> bool {
+        let held = self.held.fetch_add(bytes, Ordering::Relaxed).saturating_add(bytes);
+        if bytes <= 0 || is_done || held <= self.limit.load(Ordering::Relaxed) {
+            return true;
+        }
+        self.held.fetch_sub(bytes, Ordering::Relaxed);
+        false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_beyond_the_limit_are_refused_and_not_counted() {
+        let memory = Memory { held: AtomicIsize::new(0), limit: AtomicIsize::new(100) };
+        let held = || memory.held.load(Ordering::Relaxed);
+        assert!(memory.count(100, false) && held() == 100);
+        assert!(!memory.count(1, false) && held() == 100);
+        assert!(memory.count(1, true) && held() == 101);
+        assert!(memory.count(-51, false) && held() == 50);
+        assert!(memory.count(50, false) && held() == 100);
+    }
 }

@@ -16,25 +16,30 @@
 //! let scene = scene.commit()?;
 //!
 //! let ray = Ray::new([0.25, 0.25, 1.0], [0.0, 0.0, -1.0]);
-//! assert_eq!(scene.intersect1(&ray).map(|hit| hit.t), Some(1.0));
+//! assert!(scene.intersect1(&ray).is_some_and(|hit| (hit.t - 1.0).abs() < 1e-6));
 //! # Ok(())
 //! # }
 //! ```
 //!
+//! The README shows instances, filters, motion and batches together.
+//!
 //! # What keeps it sound
 //!
 //! - Only a [`CommittedScene`] has queries, and it no longer changes.
-//! - What Embree keeps pointers to is owned by the geometry, and a scene owns its geometries.
+//! - What Embree keeps pointers to is owned by the geometry, and a scene owns its geometries and what they instance.
 //! - Indices are checked before Embree sees them.
 //! - Hit structs have room for longer layouts than are accepted.
-//! - Rays that are not finite never reach Embree; they miss.
+//! - Rays that are not finite, or outside of the shutter, never reach Embree; they miss.
+//! - No panic of a [`Filter`] or of [`UserShapes`] unwinds into C++.
 //! - The floating-point environment of the calling thread is as before after every call.
 
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod batch;
+mod callback;
 mod device;
 mod error;
+mod filter;
 mod geometry;
 mod library;
 mod probe;
@@ -46,7 +51,9 @@ mod scene;
 pub use batch::{HitsSoAMut, RaysSoA};
 pub use device::Device;
 pub use error::{Error, ErrorCode, LoadError, Reason, Refusal, Version};
-pub use geometry::{Geometry, GeometryId, TriangleGeometry};
+pub use filter::{Candidate, Filter};
+pub use geometry::{Affine, Geometry, GeometryId, InstanceArrayGeometry, InstanceGeometry, TriangleGeometry};
+pub use geometry::{UserGeometry, UserHit, UserShapes};
 pub use library::Library;
 pub use probe::HitLayout;
 pub use query::Coherence;

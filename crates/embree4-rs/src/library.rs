@@ -1,6 +1,7 @@
 //! Finding an Embree 4 library, opening it and deciding whether it can be used.
 
 use std::ffi::{CStr, OsStr, OsString};
+use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -95,16 +96,16 @@ impl Library {
         let opened =
             unsafe { libloading::Library::new(path) }.map_err(|error| Reason::Open(open_error_text(&error, path)))?;
         // Never closed, see the type's documentation.
-        let opened = Box::leak(Box::new(opened));
+        let opened = ManuallyDrop::new(opened);
 
-        // SAFETY: these functions have the same signatures in Embree 3 and 4; the library is leaked.
-        let version_api = unsafe { VersionApi::load(opened) }.map_err(Reason::MissingSymbol)?;
+        // SAFETY: these functions have the same signatures in Embree 3 and 4; the library stays open.
+        let version_api = unsafe { VersionApi::load(&opened) }.map_err(Reason::MissingSymbol)?;
         let version = ask_version(&version_api)?;
         if version.major != 4 {
             return Err(Reason::Version(version));
         }
-        // SAFETY: the library says that it is Embree 4, and it is leaked.
-        let api = unsafe { Api::load(opened) }.map_err(Reason::MissingSymbol)?;
+        // SAFETY: the library says that it is Embree 4, and it stays open.
+        let api = unsafe { Api::load(&opened) }.map_err(Reason::MissingSymbol)?;
         // SAFETY: both tables belong to an Embree 4.
         let layout =
             unsafe { probe::hit_layout(&version_api, &api) }.map_err(|detail| Reason::Layout { version, detail })?;

@@ -2,6 +2,7 @@
 
 use std::ffi::c_int;
 use std::ops::BitOr;
+use std::panic::resume_unwind;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
@@ -34,7 +35,7 @@ impl BitOr for SceneFlags {
 /// Time spent building the tree against speed of tracing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BuildQuality {
-    /// Morton codes.
+    /// Morton codes, and a tree for each geometry below one for all.
     Low,
     /// Surface-area heuristic; Embree's default.
     #[default]
@@ -43,10 +44,22 @@ pub enum BuildQuality {
     High,
 }
 
+impl BuildQuality {
+    /// `RTCBuildQuality`.
+    fn number(self) -> c_int {
+        match self {
+            Self::Low => 0,
+            Self::Medium => 1,
+            Self::High => 2,
+        }
+    }
+}
+
 /// A scene under construction.
 #[derive(Debug)]
 pub struct Scene {
     handle: SceneHandle,
+    quality: BuildQuality,
 }
 
 impl Scene {
@@ -58,19 +71,20 @@ impl Scene {
         let raw = unsafe { (device.api().new_scene)(device.handle()) };
         drop(lock);
         let raw = device.check_handle(raw, "rtcNewScene")?;
-        let handle = SceneHandle { raw, device: Arc::clone(device), geometries: Vec::new() };
+        let handle = SceneHandle {
+            raw,
+            device: Arc::clone(device),
+            geometries: Vec::new(),
+            has_instances: false,
+            has_callbacks: false,
+        };
         // SAFETY: the scene handle is valid and nobody else has it.
         unsafe { (device.api().set_scene_flags)(handle.raw(), flags.0) };
         device.check("rtcSetSceneFlags")?;
-        let quality: c_int = match quality {
-            BuildQuality::Low => 0,
-            BuildQuality::Medium => 1,
-            BuildQuality::High => 2,
-        };
         // SAFETY: as above.
-        unsafe { (device.api().set_scene_build_quality)(handle.raw(), quality) };
+        unsafe { (device.api().set_scene_build_quality)(handle.raw(), quality.number()) };
         device.check("rtcSetSceneBuildQuality")?;
-        Ok(Self { handle })
+        Ok(Self { handle, quality })
     }
 
     /// Adds `geometry` and returns its number: 0, 1, 2 and so on.
@@ -81,11 +95,17 @@ impl Scene {
             return Err(Error::OtherDevice);
         }
         device.clear_error();
+        if self.quality == BuildQuality::Low {
+            // Otherwise a scene of low quality is made of trees of medium quality, as slow to build.
+            geometry.handle().set_quality(self.quality.number())?;
+        }
         let raw = geometry.handle().raw.as_ptr();
         // SAFETY: both handles are valid and of one device; the geometry is kept until the scene is gone.
         let id = unsafe { (device.api().attach_geometry)(self.handle.raw(), raw) };
         let checked = device.check("rtcAttachGeometry");
         // Kept even after an error, in case Embree has it all the same.
+        self.handle.has_instances |= geometry.is_instance();
+        self.handle.has_callbacks |= geometry.has_callbacks();
         self.handle.geometries.push(geometry);
         checked?;
         if id == INVALID_ID {
@@ -104,6 +124,37 @@ impl Scene {
         // SAFETY: the scene handle is valid, and `self` is the only one to use it.
         unsafe { (device.api().commit_scene)(self.handle.raw()) };
         device.check("rtcCommitScene")?;
+        self.committed()
+    }
+
+    /// Builds the tree on this thread and `threads - 1` more that end with the build.
+    ///
+    /// The device must have room for them: `threads=N,user_threads=N` in its configuration with `N` at least
+    /// `threads`; those beyond `N`, and beyond the number of processors, only wait. Otherwise like
+    /// [`Scene::commit`].
+    pub fn commit_joined(self, threads: usize) -> Result<CommittedScene, Error> {
+        let handle = &self.handle;
+        let join = || {
+            let device = &handle.device;
+            device.clear_error();
+            // SAFETY: the scene handle is valid; `self` is the only one to use it, and Embree allows this call
+            // from any number of threads at once.
+            unsafe { (device.api().join_commit_scene)(handle.raw()) };
+            device.check("rtcJoinCommitScene")
+        };
+        let results = std::thread::scope(|scope| {
+            let others: Vec<_> = (1..threads).map(|_| scope.spawn(join)).collect();
+            let mut results = vec![join()];
+            results.extend(others.into_iter().map(|thread| thread.join().unwrap_or_else(|p| resume_unwind(p))));
+            results
+        });
+        results.into_iter().collect::<Result<Vec<()>, Error>>()?;
+        self.committed()
+    }
+
+    /// The scene that a build without an error has left.
+    fn committed(self) -> Result<CommittedScene, Error> {
+        let device = &self.handle.device;
         let mut bounds = Bounds::default();
         // SAFETY: the scene is committed; `bounds` has the size and alignment of `RTCBounds`.
         unsafe { (device.api().get_scene_bounds)(self.handle.raw(), &mut bounds) };
@@ -135,6 +186,16 @@ impl CommittedScene {
     pub fn geometry(&self, id: GeometryId) -> Option<&Geometry> {
         self.handle.geometries.get(id.0 as usize)
     }
+
+    /// Whether another scene is part of this one; then it cannot be instanced itself.
+    pub fn has_instances(&self) -> bool {
+        self.handle.has_instances
+    }
+
+    /// Whether queries may call back into the program.
+    pub(crate) fn has_callbacks(&self) -> bool {
+        self.handle.has_callbacks
+    }
 }
 
 /// An owned `RTCScene` and all that must outlive it.
@@ -143,6 +204,8 @@ pub(crate) struct SceneHandle {
     pub(crate) device: Arc<Device>,
     /// In the order of their numbers.
     geometries: Vec<Geometry>,
+    has_instances: bool,
+    has_callbacks: bool,
 }
 
 // SAFETY: the handle may be used from any thread. Through a shared reference only queries use it, on
