@@ -129,22 +129,22 @@ fn agree(geometry: &Geometry, rays: &RayBatch, n: usize) -> Vec<(u32, [u32; 3])>
 fn bvh01_every_backend_finds_the_same_hits_on_filtered_and_other_parts() {
     let mut rng = Rng::new(31);
     let soup = random_soup(400, 0.5, 1.0, Vec3::ZERO, &mut rng);
-    let rays = rays(20_000, &mut rng);
+    let rays = rays(5_000, &mut rng);
     for geometry in [split(&soup, |i| i % 3 != 0, 2.0), split(&soup, |_| true, 2.0), split(&soup, |_| false, 2.0)] {
-        let hits = agree(&geometry, &rays, 20_000);
+        let hits = agree(&geometry, &rays, 5_000);
         let hit = hits.iter().filter(|hit| hit.0 != MISS).count();
-        assert!((5_000..19_990).contains(&hit), "{hit}");
+        assert!((1_000..4_999).contains(&hit), "{hit}");
     }
 }
 
 #[test]
 fn filters_may_depend_on_where_a_triangle_is_hit() {
-    // Embree's u differs by rounding, so a ray may be decided otherwise at the border: not here, of 20,000.
+    // Embree's u differs by rounding, so a ray may be decided otherwise at the border: not here, of 5,000.
     let mut rng = Rng::new(32);
     let soup = random_soup(300, 0.7, 1.0, Vec3::ZERO, &mut rng);
-    let rays = rays(20_000, &mut rng);
+    let rays = rays(5_000, &mut rng);
     let geometry = split(&soup, |i| i % 2 == 0, 0.4);
-    for (primitive, hit) in agree(&geometry, &rays, 20_000) {
+    for (primitive, hit) in agree(&geometry, &rays, 5_000) {
         assert!(primitive == MISS || primitive % 2 == 1 || f32::from_bits(hit[1]) < 0.4, "{primitive} {hit:?}");
     }
 }
@@ -160,8 +160,8 @@ fn big_triangles_that_are_not_filtered_go_in_front_of_those_that_are() {
     let geometry = split(&soup, |i| i % 2 == 0, 2.0);
     let front = Split::new(geometry.clone()).front;
     assert!(front.is_some(), "the unfiltered wall is big enough");
-    let rays = rays(20_000, &mut rng);
-    agree(&geometry, &rays, 20_000);
+    let rays = rays(5_000, &mut rng);
+    agree(&geometry, &rays, 5_000);
 }
 
 #[test]
