@@ -67,9 +67,7 @@ impl Primitives {
             Self::Each(numbers) => numbers[i],
         }
     }
-}
 
-impl Primitives {
     /// Gives triangle `i`, the one after the last, the number `number`, higher than all before.
     pub fn push(&mut self, i: usize, number: u32) {
         match self {
