@@ -26,8 +26,6 @@ pub(super) struct Interaction<L: Lanes> {
     pub uvs: UvSets<L>,
     /// Vertex colour; white where there is none.
     pub color: V3<L>,
-    /// Opacity of the vertex colour.
-    pub opacity: L::F,
     /// Unit normal of the front: interpolated, or geometric where the mesh has none or one that cannot be used.
     pub normal: V3<L>,
     /// Where it is interpolated.
@@ -54,7 +52,7 @@ pub(super) fn interact<L: Lanes>(
     let ng = triangle.ng.or_else(front, -triangle.ng);
     let p = triangle.point(b[0], b[1]);
     let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
-    let (mut color, mut opacity) = (V3::splat([1.0; 3]), L::F::one());
+    let mut color = V3::splat([1.0; 3]);
     let (mut origin, mut lifted) = (p, none);
     if tables.triangles.has_attributes() {
         let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
@@ -62,7 +60,7 @@ pub(super) fn interact<L: Lanes>(
             let a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
             uvs = a.uvs.masked(has);
             if tables.triangles.has_colors() {
-                (color, opacity) = (a.color.or_else(has, color), a.opacity.or_else(has, opacity));
+                color = a.color.or_else(has, color);
             }
             if tables.triangles.has_normals() {
                 let smooth = a.normal.normalized();
@@ -74,7 +72,7 @@ pub(super) fn interact<L: Lanes>(
             }
         }
     }
-    Interaction { triangle, p, origin, lifted, wo, ng, front, uvs, color, opacity, normal, has_normal, b }
+    Interaction { triangle, p, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
 }
 
 impl<L: Lanes> Interaction<L> {
@@ -88,6 +86,12 @@ impl<L: Lanes> Interaction<L> {
     #[inline(always)]
     pub fn start(&self) -> V3<L> {
         robust::offset_point(self.origin, self.ng, self.triangle.offset_length())
+    }
+
+    /// Just behind the surface, where a ray that passes it goes on.
+    #[inline(always)]
+    pub fn behind(&self) -> V3<L> {
+        robust::offset_point(self.p, -self.ng, self.triangle.offset_length())
     }
 
     /// Whether `wi` leads away from the surface on the viewer's side: from the triangle, or, at a raised origin, from

@@ -6,6 +6,7 @@ mod features;
 mod frame;
 mod framing;
 pub mod memory;
+mod opacity;
 mod pilot;
 mod prepare;
 mod progress;

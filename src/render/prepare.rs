@@ -2,12 +2,14 @@
 
 use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::emission::mean_emissions;
+use super::opacity::Opacities;
 use super::{AccelChoice, AccelReport, RenderSettings};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
-use crate::accel::{Accel, AccelStats, Triangles, linear::Linear, wide::WideBvh};
+use crate::accel::geometry::{Geometry, HitFilter, Object, Part};
+use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
-use crate::integrator::SceneTables;
+use crate::integrator::{Coverage, SceneTables};
 use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
@@ -18,11 +20,12 @@ use crate::shape::Mesh;
 use crate::shape::table::{Corners, NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// A scene made ready to be traced.
 pub struct Prepared {
     /// What shading reads.
-    pub tables: SceneTables,
+    pub tables: Arc<SceneTables>,
     /// What rays hit.
     pub accel: Box<dyn Accel>,
     /// Which backend and why.
@@ -56,6 +59,34 @@ struct Totals {
 /// the range of f32. Paths still find what they emit.
 const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
 
+/// The world's triangles: those that stop every ray, and those whose hits are to be asked about.
+struct Parts {
+    opaque: Part,
+    filtered: Part,
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        Self { opaque: Part::default(), filtered: Part { filtered: true, ..Part::default() } }
+    }
+}
+
+impl Parts {
+    /// Where triangles go that let some rays pass, or none.
+    fn of(&mut self, lets_rays_pass: bool) -> &mut Part {
+        if lets_rays_pass { &mut self.filtered } else { &mut self.opaque }
+    }
+
+    /// What backends are built from.
+    fn geometry(self, tables: &Arc<SceneTables>) -> Geometry {
+        let mut parts = vec![self.opaque, self.filtered];
+        parts.retain(|part| !part.triangles.indices.is_empty());
+        let is_filtered = parts.iter().any(|part| part.filtered);
+        let filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(tables))) as Arc<dyn HitFilter>);
+        Geometry { world: Object { parts, shapes: Vec::new() }, filter, ..Geometry::default() }
+    }
+}
+
 /// Prepares `scene`.
 ///
 /// # Errors
@@ -71,12 +102,12 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
     let materials = MaterialTable::new(&scene.materials, &mut textures);
     let mut triangles = TriangleTable::with_capacity(count);
-    let mut geometry = Triangles::default();
+    let mut parts = Parts::default();
     let mut lights = Vec::new();
-    let emissions = mean_emissions(scene);
+    let (emissions, opacities) = (mean_emissions(scene), Opacities::new(scene));
     let mut totals = Totals::default();
     for instance in &scene.instances {
-        flatten(scene, instance, origin, &emissions, &mut geometry, &mut triangles, &mut lights, &mut totals);
+        flatten(scene, instance, origin, &emissions, &opacities, &mut parts, &mut triangles, &mut lights, &mut totals);
     }
     let (mut warnings, mut losses) = (Vec::new(), Vec::new());
     if totals.without_area > 0 {
@@ -102,8 +133,8 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
         warnings.push(default_light.darkness(scene));
     }
     let lights = LightTable::new(&lights, environment, &mut triangles);
-    let (accel, accel_report) = build_accel(geometry, settings)?;
-    let tables = SceneTables { triangles, materials, textures, lights };
+    let tables = Arc::new(SceneTables { triangles, materials, textures, lights });
+    let (accel, accel_report) = build_accel(parts.geometry(&tables), settings)?;
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings, losses })
 }
 
@@ -162,7 +193,8 @@ fn flatten(
     instance: &Instance,
     origin: DVec3,
     emissions: &[[f64; 3]],
-    geometry: &mut Triangles,
+    opacities: &Opacities,
+    parts: &mut Parts,
     table: &mut TriangleTable,
     lights: &mut Vec<(PreparedLight, f64)>,
     totals: &mut Totals,
@@ -174,8 +206,10 @@ fn flatten(
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
     let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
-    let first = geometry.positions.len() as u32;
-    geometry.positions.extend(mesh.positions.iter().map(|&p| {
+    let part = parts.of(opacities.let_rays_pass(scene, mesh));
+    let triangles = &mut part.triangles;
+    let first = triangles.positions.len() as u32;
+    triangles.positions.extend(mesh.positions.iter().map(|&p| {
         let p = instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
         (p - origin).as_vec3().to_array()
     }));
@@ -192,7 +226,7 @@ fn flatten(
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
         let [j, k] = if mirrors { [k, j] } else { [j, k] };
-        let corner = |v: u32| glam::Vec3::from(geometry.positions[(first + v) as usize]);
+        let corner = |v: u32| glam::Vec3::from(triangles.positions[(first + v) as usize]);
         let corners = [corner(i), corner(j), corner(k)];
         // In f64: the f32 product of edges below 3e-10 underflows.
         let edges = corners.map(|c| c.as_dvec3());
@@ -226,8 +260,9 @@ fn flatten(
                 [t.x, t.y, t.z, if mirrors != turns { -w } else { w }]
             }))
         });
-        let primitive = geometry.indices.len() as u32;
-        geometry.indices.push([i, j, k].map(|v| first + v));
+        let primitive = table.len() as u32;
+        part.primitives.push(triangles.indices.len(), primitive);
+        triangles.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
         if average > 0.0 && area > LEAST_SAMPLED_AREA {
             let power = average * area * sides * std::f64::consts::PI;
@@ -290,7 +325,7 @@ fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(Prepare
 }
 
 /// Chooses and builds the backend.
-fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
+fn build_accel(geometry: Geometry, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
     let requested = match settings.accel {
         AccelChoice::Auto => "auto",
         AccelChoice::Embree => "embree",

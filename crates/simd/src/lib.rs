@@ -23,5 +23,5 @@ mod prefetch;
 
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
-pub use level::{Kernel, Level, dispatch, dispatch_large};
+pub use level::{Kernel, Level, dispatch, dispatch_large, dispatch_one};
 pub use prefetch::prefetch;
