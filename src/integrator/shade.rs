@@ -72,7 +72,8 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     if passable {
         t = t + L::F::load(&pool.travelled, at);
         let key = coverage_key::<L>(key.pixel, key.sample, depth);
-        through = passes::<L>(tables, si.triangle.material, &si.uvs, si.opacity, key, primitive, hit);
+        let instance = L::U::load(&pool.hits.instance, at);
+        through = passes::<L>(tables, si.triangle.material, &si.uvs, si.opacity, key, primitive, instance, hit);
         if tracer.cull_backfaces {
             let culled = depth.eq(L::U::splat(0)) & !si.front;
             through = through | (tables.materials.single_sided::<L>(si.triangle.material, hit) & culled);
@@ -143,7 +144,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     if passable {
         // Rays that pass go on as they were, from behind the surface.
         next = Next {
-            origin: behind(&si.triangle, si.p, -si.wo).or_else(through, next.origin),
+            origin: behind(&si.triangle, si.p, si.offset, -si.wo).or_else(through, next.origin),
             direction: (-si.wo).or_else(through, next.direction),
             beta: load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at).or_else(through, next.beta),
             pdf: L::F::load(&pool.prev_pdf, at).or_else(through, next.pdf),
