@@ -68,6 +68,8 @@ fn slices(rays: &RayBatch, range: Range<usize>) -> RaysSoA<'_> {
         dz: &rays.dz[range.clone()],
         t_max: &rays.t_max[range],
         time: None,
+        id: None,
+        mask: None,
     }
 }
 
@@ -80,6 +82,7 @@ impl Accel for EmbreeAccel {
             primitive: &mut hits.primitive[range.clone()],
             geometry: &mut hits.instance[range.clone()],
             instance: None,
+            instance_primitive: None,
         };
         self.scene.intersect_batch(slices(rays, range.clone()), coherent, into);
         // Embree numbers the triangles of each geometry from 0.

@@ -24,6 +24,10 @@ pub struct RaysSoA<'a> {
     pub t_max: &'a [f32],
     /// Times in [0, 1]; `None` is 0 for all.
     pub time: Option<&'a [f32]>,
+    /// Numbers that filters see as [`Candidate::ray_id`](crate::Candidate); `None` is 0 for all.
+    pub id: Option<&'a [u32]>,
+    /// Ray masks; `None` is every bit for all.
+    pub mask: Option<&'a [u32]>,
 }
 
 impl RaysSoA<'_> {
@@ -50,6 +54,9 @@ impl RaysSoA<'_> {
         ] {
             assert_eq!(slice.len(), len, "length of RaysSoA::{name} must be that of ox");
         }
+        for (name, slice) in [("id", self.id), ("mask", self.mask)] {
+            assert!(slice.is_none_or(|s| s.len() == len), "length of RaysSoA::{name} must be that of ox");
+        }
     }
 
     /// Fills the first `count` lanes of `packet` with the rays from `start` on. The other lanes keep
@@ -64,6 +71,12 @@ impl RaysSoA<'_> {
         copy_in(&mut packet.t_max, self.t_max, start, count);
         if let Some(time) = self.time {
             copy_in(&mut packet.time, time, start, count);
+        }
+        if let Some(id) = self.id {
+            copy_in(&mut packet.id, id, start, count);
+        }
+        if let Some(mask) = self.mask {
+            copy_in(&mut packet.mask, mask, start, count);
         }
     }
 }
@@ -83,6 +96,8 @@ pub struct HitsSoAMut<'a> {
     pub geometry: &'a mut [u32],
     /// Instances, if wanted; `u32::MAX` for none and for a miss.
     pub instance: Option<&'a mut [u32]>,
+    /// Places in instance arrays, if wanted; see [`Hit::instance_primitive`](crate::Hit).
+    pub instance_primitive: Option<&'a mut [u32]>,
 }
 
 impl HitsSoAMut<'_> {
@@ -90,15 +105,17 @@ impl HitsSoAMut<'_> {
         let message = "length of every slice of HitsSoAMut must be that of the rays";
         assert!(self.t.len() == len && self.u.len() == len && self.v.len() == len, "{message}");
         assert!(self.primitive.len() == len && self.geometry.len() == len, "{message}");
-        assert!(self.instance.as_ref().is_none_or(|slice| slice.len() == len), "{message}");
+        for slice in [&self.instance, &self.instance_primitive].into_iter().flatten() {
+            assert!(slice.len() == len, "{message}");
+        }
     }
 }
 
 impl CommittedScene {
     /// Writes the closest hits of all `rays` to `hits`.
     ///
-    /// A ray with a NaN or infinite origin or direction, or with a `t_max` that is NaN or negative,
-    /// is a miss. `coherent` says that neighbours in the slices go much the same way, as camera rays
+    /// A ray with a NaN or infinite origin or direction, with a `t_max` that is NaN or negative, or with a
+    /// time outside [0, 1] is a miss. `coherent` says that neighbours in the slices go much the same way, as camera rays
     /// in pixel order do; wrong is slow, not incorrect.
     ///
     /// Where two triangles are hit at the same distance, such as on a shared edge, which one is reported
@@ -136,7 +153,7 @@ impl CommittedScene {
         hits: HitsSoAMut<'_>,
     ) {
         let mut packet = RayHitPacket::<N>::default();
-        let mut instance = hits.instance;
+        let (mut instance, mut instance_primitive) = (hits.instance, hits.instance_primitive);
         for (start, count, valid) in packets::<N>(rays.len()) {
             rays.load(start, count, &mut packet.ray);
             self.intersect_packet(&valid, &mut packet, arguments);
@@ -147,6 +164,9 @@ impl CommittedScene {
             copy_out(hits.geometry, start, count, &packet.hit.geometry);
             if let Some(instance) = &mut instance {
                 copy_out(instance, start, count, &packet.hit.instance);
+            }
+            if let Some(instance_primitive) = &mut instance_primitive {
+                copy_out(instance_primitive, start, count, &packet.hit.instance_primitive);
             }
         }
     }
@@ -175,7 +195,7 @@ fn packets<const N: usize>(len: usize) -> impl Iterator<Item = (usize, usize, Ma
     })
 }
 
-fn copy_in<const N: usize>(lanes: &mut [f32; N], slice: &[f32], start: usize, count: usize) {
+fn copy_in<const N: usize, T: Copy>(lanes: &mut [T; N], slice: &[T], start: usize, count: usize) {
     // A whole packet is a copy of known length, a few vector moves; the tail is a call to memcpy.
     if count == N {
         lanes.copy_from_slice(&slice[start..start + N]);

@@ -155,7 +155,7 @@ impl fmt::Display for ErrorCode {
 }
 
 /// What a build call reports.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
     /// Embree reported an error.
@@ -199,6 +199,30 @@ pub enum Error {
     },
     /// The geometry was made on another device than the scene.
     OtherDevice,
+    /// A geometry was given no time key.
+    NoKeys,
+    /// The arrays of the time keys differ in length.
+    KeyLength {
+        /// The first key that differs from key 0.
+        key: usize,
+        /// How many items it has.
+        found: usize,
+        /// How many key 0 has.
+        expected: usize,
+    },
+    /// The matrix of an instance is not finite or cannot be inverted.
+    Matrix {
+        /// The matrix, column by column.
+        matrix: [[f32; 3]; 4],
+        /// Index of the instance in its geometry.
+        instance: usize,
+        /// Index of the time key.
+        key: usize,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// The scene to be instanced contains instances itself.
+    SecondLevel,
 }
 
 impl fmt::Display for Error {
@@ -220,11 +244,24 @@ impl fmt::Display for Error {
                  indices must be below that"
             ),
             Self::TooMany { what, count, limit } => {
-                write!(f, "{count} {what} in one mesh, at most {limit} are possible; split the mesh")
+                write!(f, "{count} {what} in one geometry, at most {limit} are possible; split it")
             }
             Self::OtherDevice => {
                 write!(f, "the geometry belongs to another device than the scene")
             }
+            Self::NoKeys => write!(f, "no time key was given; a geometry at rest has one"),
+            Self::KeyLength { key, found, expected } => write!(
+                f,
+                "time key {key} has {found} items, but key 0 has {expected}; all keys must have the same number"
+            ),
+            Self::Matrix { matrix, instance, key, problem } => {
+                write!(f, "the matrix of instance {instance} at time key {key}, columns {matrix:?}, {problem}")
+            }
+            Self::SecondLevel => write!(
+                f,
+                "the scene to be instanced contains instances itself, but one level is possible; multiply the \
+                 matrices and instance the inner scene"
+            ),
         }
     }
 }

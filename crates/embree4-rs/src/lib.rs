@@ -33,8 +33,10 @@
 #![deny(unsafe_op_in_unsafe_fn)]
 
 mod batch;
+mod callback;
 mod device;
 mod error;
+mod filter;
 mod geometry;
 mod library;
 mod probe;
@@ -46,7 +48,9 @@ mod scene;
 pub use batch::{HitsSoAMut, RaysSoA};
 pub use device::Device;
 pub use error::{Error, ErrorCode, LoadError, Reason, Refusal, Version};
-pub use geometry::{Geometry, GeometryId, TriangleGeometry};
+pub use filter::{Candidate, Filter};
+pub use geometry::{Affine, Geometry, GeometryId, InstanceArrayGeometry, InstanceGeometry, TriangleGeometry};
+pub use geometry::{UserGeometry, UserHit, UserShapes};
 pub use library::Library;
 pub use probe::HitLayout;
 pub use query::Coherence;

@@ -5,14 +5,16 @@
 //! longer. The version number does not tell. So each query is run once on a known triangle, in a buffer full of
 //! sentinel words, and every word of the buffer is compared with what a known layout leaves there.
 //!
-//! A second instance level cannot be seen without instances: when scenes get them, so must the probe.
+//! All of it twice, with the triangle itself and with an instance of it: what a library that was built for more
+//! than one level writes behind the first instance number shows in one of the two.
 
 use std::mem::size_of;
 use std::ptr::null_mut;
 
 use crate::raw::{
-    Api, BUFFER_TYPE_INDEX, BUFFER_TYPE_VERTEX, FORMAT_FLOAT3, FORMAT_UINT3, GEOMETRY_TYPE_TRIANGLE, INVALID_ID,
-    QueryArguments, RtcDevice, RtcGeometry, RtcScene, VersionApi, property, query_flag,
+    Api, BUFFER_TYPE_INDEX, BUFFER_TYPE_VERTEX, FORMAT_FLOAT3, FORMAT_UINT3, GEOMETRY_TYPE_INSTANCE,
+    GEOMETRY_TYPE_TRIANGLE, INVALID_ID, QueryArguments, RtcDevice, RtcGeometry, RtcScene, VersionApi, property,
+    query_flag,
 };
 
 /// A layout of `RTCHit` that this crate knows.
@@ -31,6 +33,7 @@ const RAY_ROWS: usize = 12;
 const ROW_T_MAX: usize = 8;
 const GEOMETRY_ID: u32 = 5;
 const PRIMITIVE_ID: u32 = 2;
+const INSTANCE_ID: u32 = 9;
 
 /// Room for the widest packet, 64-byte aligned.
 #[repr(C, align(64))]
@@ -53,7 +56,8 @@ pub(crate) unsafe fn hit_layout(version_api: &VersionApi, api: &Api) -> Result<H
     // SAFETY: the handles are checked before use and released by `Handles`, which is dropped before
     // the arrays that Embree reads.
     unsafe {
-        let mut handles = Handles { version_api, api, device: null_mut(), scene: null_mut(), geometry: null_mut() };
+        let mut handles =
+            Handles { version_api, api, device: null_mut(), scenes: [null_mut(); 2], geometries: [null_mut(); 2] };
         handles.device = (version_api.new_device)(c"threads=1".as_ptr());
         if handles.device.is_null() {
             return Err("no device for the probe rays".into());
@@ -61,29 +65,39 @@ pub(crate) unsafe fn hit_layout(version_api: &VersionApi, api: &Api) -> Result<H
         if (version_api.get_device_property)(handles.device, property::TRIANGLE_GEOMETRY_SUPPORTED) == 0 {
             return Err("built without triangles".into());
         }
-        handles.geometry = (api.new_geometry)(handles.device, GEOMETRY_TYPE_TRIANGLE);
-        handles.scene = (api.new_scene)(handles.device);
-        if handles.geometry.is_null() || handles.scene.is_null() {
-            return Err("no scene for the probe rays".into());
+        for (at, kind) in [GEOMETRY_TYPE_TRIANGLE, GEOMETRY_TYPE_INSTANCE].into_iter().enumerate() {
+            handles.geometries[at] = (api.new_geometry)(handles.device, kind);
+            handles.scenes[at] = (api.new_scene)(handles.device);
+            if handles.geometries[at].is_null() || handles.scenes[at].is_null() {
+                return Err("no scene for the probe rays".into());
+            }
         }
-        let (geometry, scene) = (handles.geometry, handles.scene);
+        let ([geometry, instance], [scene, outer]) = (handles.geometries, handles.scenes);
         let set_buffer = api.set_shared_geometry_buffer;
         set_buffer(geometry, BUFFER_TYPE_VERTEX, 0, FORMAT_FLOAT3, vertices.as_ptr().cast(), 0, 12, 3);
         set_buffer(geometry, BUFFER_TYPE_INDEX, 0, FORMAT_UINT3, indices.as_ptr().cast(), 0, 12, 3);
         (api.commit_geometry)(geometry);
         (api.attach_geometry_by_id)(scene, geometry, GEOMETRY_ID);
         (api.commit_scene)(scene);
+        (api.set_geometry_instanced_scene)(instance, scene);
+        (api.commit_geometry)(instance);
+        (api.attach_geometry_by_id)(outer, instance, INSTANCE_ID);
+        (api.commit_scene)(outer);
         let error = (version_api.get_device_error)(handles.device);
         if error != 0 {
             return Err(format!("error {error} while building the probe triangle"));
         }
-        trace_probes(api, scene)
+        let layout = trace_probes(api, scene, None)?;
+        let instanced = trace_probes(api, outer, Some(INSTANCE_ID)).map_err(|text| format!("{text} (instance)"))?;
+        if instanced == layout { Ok(layout) } else { Err("hits of an instance are unlike the others".into()) }
     }
 }
 
+/// `instance` is the number of the instance that the triangle is in.
+///
 /// # Safety
 /// `scene` must be committed and belong to `api`.
-unsafe fn trace_probes(api: &Api, scene: *mut RtcScene) -> Result<HitLayout, String> {
+unsafe fn trace_probes(api: &Api, scene: *mut RtcScene, instance: Option<u32>) -> Result<HitLayout, String> {
     let mut layout = None;
     for width in [1, 8, 16] {
         for flags in [query_flag::INCOHERENT, query_flag::COHERENT] {
@@ -100,7 +114,7 @@ unsafe fn trace_probes(api: &Api, scene: *mut RtcScene) -> Result<HitLayout, Str
                     _ => (api.intersect16)(valid, scene, data.cast(), &mut arguments),
                 }
             }
-            let found = check_hit(&buffer, &lanes, width)?;
+            let found = check_hit(&buffer, &lanes, width, instance)?;
             if *layout.get_or_insert(found) != found {
                 return Err(format!("rtcIntersect{width} writes hits unlike the others"));
             }
@@ -154,7 +168,9 @@ fn probe_rays(width: usize) -> Buffer {
     buffer
 }
 
-fn check_hit(buffer: &Buffer, lanes: &Lanes, width: usize) -> Result<HitLayout, String> {
+fn check_hit(buffer: &Buffer, lanes: &Lanes, width: usize, instance: Option<u32>) -> Result<HitLayout, String> {
+    // `instID` and `instPrimID`; the only place of an instance is 0.
+    let ids = instance.map_or([INVALID_ID; 2], |id| [id, 0]);
     let before = probe_rays(width);
     let mut layout = HitLayout::Plain;
     let near = |word: u32, value: f32| (f32::from_bits(word) - value).abs() <= 1e-5 * value.abs();
@@ -173,8 +189,8 @@ fn check_hit(buffer: &Buffer, lanes: &Lanes, width: usize) -> Result<HitLayout, 
                 Some(4) => near(word, 0.5),
                 Some(5) => word == PRIMITIVE_ID,
                 Some(6) => word == GEOMETRY_ID,
-                Some(7) => word == INVALID_ID,
-                Some(8) if word == INVALID_ID => {
+                Some(7) => word == ids[0],
+                Some(8) if word == ids[1] => {
                     layout = HitLayout::InstancePrimitive;
                     true
                 }
@@ -187,8 +203,8 @@ fn check_hit(buffer: &Buffer, lanes: &Lanes, width: usize) -> Result<HitLayout, 
     }
     // `instPrimID` is written in all lanes or in none.
     let row = &buffer.0[(RAY_ROWS + 8) * width..][..width];
-    let written = INVALID_ID == row[0];
-    let is_even = (0..width).all(|lane| lanes.0[lane] == 0 || (row[lane] == INVALID_ID) == written);
+    let written = ids[1] == row[0];
+    let is_even = (0..width).all(|lane| lanes.0[lane] == 0 || (row[lane] == ids[1]) == written);
     if is_even { Ok(layout) } else { Err(format!("rtcIntersect{width} writes instPrimID in some lanes only")) }
 }
 
@@ -213,19 +229,20 @@ struct Handles<'a> {
     version_api: &'a VersionApi,
     api: &'a Api,
     device: *mut RtcDevice,
-    scene: *mut RtcScene,
-    geometry: *mut RtcGeometry,
+    /// With the triangle, with its instance.
+    scenes: [*mut RtcScene; 2],
+    geometries: [*mut RtcGeometry; 2],
 }
 
 impl Drop for Handles<'_> {
     fn drop(&mut self) {
         // SAFETY: each handle is null or owned by this struct.
         unsafe {
-            if !self.scene.is_null() {
-                (self.api.release_scene)(self.scene);
+            for scene in self.scenes.into_iter().rev().filter(|scene| !scene.is_null()) {
+                (self.api.release_scene)(scene);
             }
-            if !self.geometry.is_null() {
-                (self.api.release_geometry)(self.geometry);
+            for geometry in self.geometries.into_iter().rev().filter(|geometry| !geometry.is_null()) {
+                (self.api.release_geometry)(geometry);
             }
             if !self.device.is_null() {
                 (self.version_api.release_device)(self.device);
@@ -244,16 +261,15 @@ const _: () = {
 mod tests {
     use super::*;
 
-    /// What a library with `hit_rows` rows of hit would leave.
-    fn written(width: usize, hit_rows: usize) -> (Buffer, Lanes) {
+    /// What a library with `hit_rows` rows of hit would leave; `ids` are the words from `instID` on.
+    fn written(width: usize, hit_rows: usize, ids: [u32; 3]) -> (Buffer, Lanes) {
         let mut buffer = probe_rays(width);
         let lanes = valid_lanes(width);
         let one = 1.0f32.to_bits();
-        let hit = [0, 0, one, 0.25f32.to_bits(), 0.5f32.to_bits(), PRIMITIVE_ID, GEOMETRY_ID];
+        let hit = [0, 0, one, 0.25f32.to_bits(), 0.5f32.to_bits(), PRIMITIVE_ID, GEOMETRY_ID, ids[0], ids[1], ids[2]];
         for lane in (0..width).filter(|&lane| lanes.0[lane] != 0) {
             buffer.0[ROW_T_MAX * width + lane] = 3.0f32.to_bits();
-            for row in 0..hit_rows {
-                let word = hit.get(row).copied().unwrap_or(INVALID_ID);
+            for (row, &word) in hit[..hit_rows].iter().enumerate() {
                 buffer.0[(RAY_ROWS + row) * width + lane] = word;
             }
         }
@@ -263,31 +279,43 @@ mod tests {
     #[test]
     fn both_known_layouts_are_told_apart() {
         for width in [1, 8, 16] {
-            let (buffer, lanes) = written(width, 8);
-            assert_eq!(check_hit(&buffer, &lanes, width), Ok(HitLayout::Plain));
-            let (buffer, lanes) = written(width, 9);
-            assert_eq!(check_hit(&buffer, &lanes, width), Ok(HitLayout::InstancePrimitive));
+            for (instance, ids) in [(None, [INVALID_ID; 3]), (Some(INSTANCE_ID), [INSTANCE_ID, 0, INVALID_ID])] {
+                let (buffer, lanes) = written(width, 8, ids);
+                assert_eq!(check_hit(&buffer, &lanes, width, instance), Ok(HitLayout::Plain));
+                let (buffer, lanes) = written(width, 9, ids);
+                assert_eq!(check_hit(&buffer, &lanes, width, instance), Ok(HitLayout::InstancePrimitive));
+            }
+        }
+    }
+
+    #[test]
+    fn a_library_for_two_levels_is_refused() {
+        for width in [1, 8, 16] {
+            // Without instance arrays it ends the list of numbers where `instPrimID` would be.
+            let (buffer, lanes) = written(width, 9, [INSTANCE_ID, INVALID_ID, 0]);
+            let message = check_hit(&buffer, &lanes, width, Some(INSTANCE_ID)).unwrap_err();
+            assert!(message.contains("in word 20"), "{message}");
         }
     }
 
     #[test]
     fn a_longer_or_shifted_hit_is_refused() {
         for width in [1, 8, 16] {
-            let (buffer, lanes) = written(width, 10);
-            let message = check_hit(&buffer, &lanes, width).unwrap_err();
+            let (buffer, lanes) = written(width, 10, [INVALID_ID; 3]);
+            let message = check_hit(&buffer, &lanes, width, None).unwrap_err();
             assert!(message.contains("in word 21"), "{message}");
 
-            let (mut buffer, lanes) = written(width, 9);
+            let (mut buffer, lanes) = written(width, 9, [INVALID_ID; 3]);
             buffer.0.copy_within(RAY_ROWS * width..(RAY_ROWS + 9) * width, (RAY_ROWS + 1) * width);
-            assert!(check_hit(&buffer, &lanes, width).is_err());
+            assert!(check_hit(&buffer, &lanes, width, None).is_err());
         }
     }
 
     #[test]
     fn a_write_to_a_lane_that_is_not_valid_is_refused() {
-        let (mut buffer, lanes) = written(16, 9);
+        let (mut buffer, lanes) = written(16, 9, [INVALID_ID; 3]);
         buffer.0[(RAY_ROWS + 3) * 16 + 15] = 0;
-        assert!(check_hit(&buffer, &lanes, 16).unwrap_err().contains("of lane 15"));
+        assert!(check_hit(&buffer, &lanes, 16, None).unwrap_err().contains("of lane 15"));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! No query looks at Embree's error state: with a committed scene and rays that pass
 //! [`Ray::is_traceable`] there is nothing to report, and asking costs as much as an easy ray.
 
+use crate::callback;
 use crate::raw::{INVALID_ID, QueryArguments, query_flag};
 use crate::ray::{Hit, Mask, Mask8, Mask16, Ray, Ray8, Ray16, RayHit, RayHit8, RayHit16};
 use crate::ray::{RayHitPacket, RayPacket};
@@ -42,6 +43,7 @@ impl CommittedScene {
         unsafe {
             (self.device().api().intersect1)(self.handle.raw(), &mut rayhit, &mut arguments);
         }
+        self.resume_panic();
         let RayHit { ray, hit } = rayhit;
         (hit.geometry != INVALID_ID).then_some(Hit {
             t: ray.t_max,
@@ -51,6 +53,7 @@ impl CommittedScene {
             primitive: hit.primitive,
             geometry: hit.geometry,
             instance: hit.instance,
+            instance_primitive: hit.instance_primitive,
         })
     }
 
@@ -63,6 +66,7 @@ impl CommittedScene {
         let mut arguments = Coherence::Incoherent.arguments();
         // SAFETY: the scene is committed; the struct is `RTCRay`.
         unsafe { (self.device().api().occluded1)(self.handle.raw(), &mut ray, &mut arguments) };
+        self.resume_panic();
         ray.t_max == f32::NEG_INFINITY
     }
 
@@ -109,6 +113,7 @@ impl CommittedScene {
                 _ => unreachable!("packets are 8 or 16 wide"),
             }
         }
+        self.resume_panic();
     }
 
     pub(crate) fn occluded_packet<const N: usize>(
@@ -128,7 +133,15 @@ impl CommittedScene {
                 _ => unreachable!("packets are 8 or 16 wide"),
             }
         }
+        self.resume_panic();
         // A lane that was not traced may have come in with a `t_max` of negative infinity.
         Mask(std::array::from_fn(|lane| valid.0[lane] & -i32::from(rays.t_max[lane] == f32::NEG_INFINITY)))
+    }
+
+    /// To be called after every query, for the sake of the callbacks that it may have run.
+    fn resume_panic(&self) {
+        if self.has_callbacks() {
+            callback::resume_panic();
+        }
     }
 }

@@ -8,6 +8,8 @@ use std::ffi::{c_char, c_int, c_void};
 use std::mem::{align_of, offset_of, size_of};
 use std::ptr::null_mut;
 
+use crate::filter::FilterFunction;
+use crate::geometry::{BoundsFunction, UserFunction};
 use crate::ray::{Ray, RayHit, RayHitPacket, RayPacket};
 
 /// What an `RTCDevice` points to.
@@ -54,10 +56,17 @@ pub(crate) mod query_flag {
 }
 
 pub(crate) const GEOMETRY_TYPE_TRIANGLE: c_int = 0;
+pub(crate) const GEOMETRY_TYPE_USER: c_int = 120;
+pub(crate) const GEOMETRY_TYPE_INSTANCE: c_int = 121;
+pub(crate) const GEOMETRY_TYPE_INSTANCE_ARRAY: c_int = 122;
 pub(crate) const BUFFER_TYPE_INDEX: c_int = 0;
 pub(crate) const BUFFER_TYPE_VERTEX: c_int = 1;
+pub(crate) const BUFFER_TYPE_TRANSFORM: c_int = 23;
 pub(crate) const FORMAT_UINT3: c_int = 0x5003;
 pub(crate) const FORMAT_FLOAT3: c_int = 0x9003;
+pub(crate) const FORMAT_FLOAT3X4_COLUMN_MAJOR: c_int = 0x9234;
+/// `RTC_MAX_TIME_STEP_COUNT`.
+pub(crate) const MAX_TIME_STEPS: usize = 129;
 
 /// `RTC_FEATURE_FLAG_ALL`. CPU devices ignore the feature mask; it is there for GPUs.
 const FEATURE_ALL: u32 = u32::MAX;
@@ -195,6 +204,20 @@ function_table! {
         release_geometry = "rtcReleaseGeometry": fn(*mut RtcGeometry);
         set_shared_geometry_buffer = "rtcSetSharedGeometryBuffer":
             fn(*mut RtcGeometry, c_int, u32, c_int, *const c_void, usize, usize, usize);
+        set_geometry_time_step_count = "rtcSetGeometryTimeStepCount": fn(*mut RtcGeometry, u32);
+        set_geometry_mask = "rtcSetGeometryMask": fn(*mut RtcGeometry, u32);
+        set_geometry_instanced_scene = "rtcSetGeometryInstancedScene": fn(*mut RtcGeometry, *mut RtcScene);
+        set_geometry_transform = "rtcSetGeometryTransform": fn(*mut RtcGeometry, u32, c_int, *const c_void);
+        set_geometry_user_data = "rtcSetGeometryUserData": fn(*mut RtcGeometry, *mut c_void);
+        set_geometry_intersect_filter_function = "rtcSetGeometryIntersectFilterFunction":
+            fn(*mut RtcGeometry, Option<FilterFunction>);
+        set_geometry_occluded_filter_function = "rtcSetGeometryOccludedFilterFunction":
+            fn(*mut RtcGeometry, Option<FilterFunction>);
+        set_geometry_user_primitive_count = "rtcSetGeometryUserPrimitiveCount": fn(*mut RtcGeometry, u32);
+        set_geometry_bounds_function = "rtcSetGeometryBoundsFunction":
+            fn(*mut RtcGeometry, Option<BoundsFunction>, *mut c_void);
+        set_geometry_intersect_function = "rtcSetGeometryIntersectFunction": fn(*mut RtcGeometry, Option<UserFunction>);
+        set_geometry_occluded_function = "rtcSetGeometryOccludedFunction": fn(*mut RtcGeometry, Option<UserFunction>);
         commit_geometry = "rtcCommitGeometry": fn(*mut RtcGeometry);
 
         new_scene = "rtcNewScene": fn(*mut RtcDevice) -> *mut RtcScene;

@@ -8,7 +8,7 @@ use crate::raw::INVALID_ID;
 /// One ray segment, `RTCRay`.
 ///
 /// A query treats a ray as a miss, without handing it to Embree, unless origin and direction are
-/// finite and `0 <= t_min <= t_max`; `t_max` may be infinite. The direction need not be unit length:
+/// finite, `0 <= t_min <= t_max` and `0 <= time <= 1`; `t_max` may be infinite. The direction need not be unit length:
 /// `t` counts in lengths of the direction.
 #[repr(C, align(16))]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +40,8 @@ impl Ray {
     /// Whether a query hands this ray to Embree; see the type's documentation.
     pub fn is_traceable(&self) -> bool {
         let ends = self.origin.iter().chain(&self.direction);
-        ends.into_iter().all(|x| x.is_finite()) && self.t_min >= 0.0 && self.t_max >= self.t_min
+        let is_segment = self.t_min >= 0.0 && self.t_max >= self.t_min;
+        ends.into_iter().all(|x| x.is_finite()) && is_segment && (0.0..=1.0).contains(&self.time)
     }
 }
 
@@ -60,8 +61,12 @@ pub struct Hit {
     pub primitive: u32,
     /// Geometry that was hit.
     pub geometry: u32,
-    /// Instance that was hit, `u32::MAX` for none.
+    /// Geometry number of the instance that was hit, `u32::MAX` for none.
     pub instance: u32,
+    /// Place in an [`InstanceArrayGeometry`](crate::InstanceArrayGeometry), 0 in an instance of its own,
+    /// `u32::MAX` for no instance. Libraries with [`HitLayout::Plain`](crate::HitLayout) leave
+    /// `u32::MAX` always.
+    pub instance_primitive: u32,
 }
 
 /// `RTCHit`. Libraries up to 4.2 have no `instance_primitive`; libraries built for more instance
@@ -75,7 +80,7 @@ pub(crate) struct RawHit {
     pub(crate) primitive: u32,
     pub(crate) geometry: u32,
     pub(crate) instance: u32,
-    instance_primitive: u32,
+    pub(crate) instance_primitive: u32,
     slack: [u32; 23],
 }
 
@@ -202,7 +207,8 @@ impl<const N: usize> RayPacket<N> {
         Mask(std::array::from_fn(|i| {
             let origin = self.origin_x[i] * 0.0 + self.origin_y[i] * 0.0 + self.origin_z[i] * 0.0;
             let direction = self.direction_x[i] * 0.0 + self.direction_y[i] * 0.0 + self.direction_z[i] * 0.0;
-            let is_ok = (origin + direction == 0.0) & (self.t_min[i] >= 0.0) & (self.t_max[i] >= self.t_min[i]);
+            let is_segment = (self.t_min[i] >= 0.0) & (self.t_max[i] >= self.t_min[i]);
+            let is_ok = (origin + direction == 0.0) & is_segment & (self.time[i] >= 0.0) & (self.time[i] <= 1.0);
             // Only -1 and 0 are defined for Embree.
             -i32::from(is_ok & (valid.0[i] != 0))
         }))
@@ -229,7 +235,8 @@ pub struct HitPacket<const N: usize> {
     pub geometry: [u32; N],
     /// Instances, `u32::MAX` for none.
     pub instance: [u32; N],
-    instance_primitive: [u32; N],
+    /// Places in instance arrays; see [`Hit::instance_primitive`].
+    pub instance_primitive: [u32; N],
     // As in `RawHit`: never read, only there to be written to.
     slack: [[u32; N]; 7],
 }
@@ -260,6 +267,7 @@ impl<const N: usize> HitPacket<N> {
         self.primitive = [INVALID_ID; N];
         self.geometry = [INVALID_ID; N];
         self.instance = [INVALID_ID; N];
+        self.instance_primitive = [INVALID_ID; N];
     }
 }
 

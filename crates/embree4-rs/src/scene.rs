@@ -58,7 +58,13 @@ impl Scene {
         let raw = unsafe { (device.api().new_scene)(device.handle()) };
         drop(lock);
         let raw = device.check_handle(raw, "rtcNewScene")?;
-        let handle = SceneHandle { raw, device: Arc::clone(device), geometries: Vec::new() };
+        let handle = SceneHandle {
+            raw,
+            device: Arc::clone(device),
+            geometries: Vec::new(),
+            has_instances: false,
+            has_callbacks: false,
+        };
         // SAFETY: the scene handle is valid and nobody else has it.
         unsafe { (device.api().set_scene_flags)(handle.raw(), flags.0) };
         device.check("rtcSetSceneFlags")?;
@@ -86,6 +92,8 @@ impl Scene {
         let id = unsafe { (device.api().attach_geometry)(self.handle.raw(), raw) };
         let checked = device.check("rtcAttachGeometry");
         // Kept even after an error, in case Embree has it all the same.
+        self.handle.has_instances |= geometry.is_instance();
+        self.handle.has_callbacks |= geometry.has_callbacks();
         self.handle.geometries.push(geometry);
         checked?;
         if id == INVALID_ID {
@@ -98,11 +106,14 @@ impl Scene {
     ///
     /// Embree builds on threads of its own (`threads` in the device's configuration) and this one.
     /// It switches flush-to-zero on in this thread meanwhile, and back before it returns.
+    ///
+    /// A panic in a [`UserShapes::bounds`](crate::UserShapes::bounds) comes out of here.
     pub fn commit(self) -> Result<CommittedScene, Error> {
         let device = &self.handle.device;
         device.clear_error();
         // SAFETY: the scene handle is valid, and `self` is the only one to use it.
         unsafe { (device.api().commit_scene)(self.handle.raw()) };
+        self.resume_build_panic();
         device.check("rtcCommitScene")?;
         let mut bounds = Bounds::default();
         // SAFETY: the scene is committed; `bounds` has the size and alignment of `RTCBounds`.
@@ -110,6 +121,17 @@ impl Scene {
         device.check("rtcGetSceneBounds")?;
         let is_empty = (0..3).any(|axis| bounds.lower[axis] > bounds.upper[axis]);
         Ok(CommittedScene { handle: self.handle, bounds: (!is_empty).then_some([bounds.lower, bounds.upper]) })
+    }
+}
+
+impl Scene {
+    /// Goes on with a panic that a callback of the build has left behind.
+    fn resume_build_panic(&self) {
+        for geometry in &self.handle.geometries {
+            if let Geometry::User(shapes) = geometry {
+                shapes.resume_build_panic();
+            }
+        }
     }
 }
 
@@ -135,6 +157,16 @@ impl CommittedScene {
     pub fn geometry(&self, id: GeometryId) -> Option<&Geometry> {
         self.handle.geometries.get(id.0 as usize)
     }
+
+    /// Whether another scene is part of this one; then it cannot be instanced itself.
+    pub fn has_instances(&self) -> bool {
+        self.handle.has_instances
+    }
+
+    /// Whether queries may call back into the program.
+    pub(crate) fn has_callbacks(&self) -> bool {
+        self.handle.has_callbacks
+    }
 }
 
 /// An owned `RTCScene` and all that must outlive it.
@@ -143,6 +175,8 @@ pub(crate) struct SceneHandle {
     pub(crate) device: Arc<Device>,
     /// In the order of their numbers.
     geometries: Vec<Geometry>,
+    has_instances: bool,
+    has_callbacks: bool,
 }
 
 // SAFETY: the handle may be used from any thread. Through a shared reference only queries use it, on

@@ -2,13 +2,11 @@
 
 mod common;
 
-use common::{device, scene_of, square};
+use common::{Batch, MISS, Numbers, device, scene_of, square};
 use embree4_rs::{
-    BuildQuality, Coherence, GeometryId, HitsSoAMut, Mask8, Mask16, Ray, Ray8, Ray16, RayHit8, RayHit16, RaysSoA,
-    Scene, SceneFlags, TriangleGeometry,
+    BuildQuality, Coherence, GeometryId, Mask8, Mask16, Ray, Ray8, Ray16, RayHit8, RayHit16, RaysSoA, Scene,
+    SceneFlags, TriangleGeometry,
 };
-
-const MISS: u32 = u32::MAX;
 
 /// Down on the unit right triangle at z = 0: a hit with u = x, v = y, t = 2.
 fn down(x: f32, y: f32) -> Ray {
@@ -17,16 +15,6 @@ fn down(x: f32, y: f32) -> Ray {
 
 fn triangle() -> common::Mesh {
     (vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]])
-}
-
-/// Deterministic numbers in [0, 1).
-struct Numbers(u32);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (self.0 >> 8) as f32 / 16_777_216.0
-    }
 }
 
 #[test]
@@ -93,7 +81,7 @@ packet_test!(eight_rays_hit_miss_and_are_masked, 8, Ray8, RayHit8, Mask8, inters
 packet_test!(sixteen_rays_hit_miss_and_are_masked, 16, Ray16, RayHit16, Mask16, intersect16, occluded16);
 
 #[test]
-fn rays_that_are_not_finite_miss_in_every_query() {
+fn rays_that_are_no_rays_miss_in_every_query() {
     let Some(device) = device("threads=1") else { return };
     let scene = scene_of(&device, [triangle()]);
     let good = down(0.25, 0.25);
@@ -110,6 +98,9 @@ fn rays_that_are_not_finite_miss_in_every_query() {
     }
     for t_max in [f32::NAN, -1.0, f32::NEG_INFINITY] {
         bad.push(Ray { t_max, ..good });
+    }
+    for time in [f32::NAN, -0.1, 1.1, f32::INFINITY] {
+        bad.push(Ray { time, ..good });
     }
     for ray in &bad {
         assert!(scene.intersect1(ray).is_none() && !scene.occluded1(ray), "{ray:?}");
@@ -132,70 +123,6 @@ fn a_direction_of_zero_misses() {
     let scene = scene_of(&device, [triangle()]);
     let ray = Ray::new([0.25, 0.25, 1.0], [0.0; 3]);
     assert!(scene.intersect1(&ray).is_none() && !scene.occluded1(&ray));
-}
-
-/// Rays in the form that batches take.
-struct Batch {
-    columns: [Vec<f32>; 7],
-}
-
-struct Hits {
-    t: Vec<f32>,
-    u: Vec<f32>,
-    v: Vec<f32>,
-    primitive: Vec<u32>,
-    geometry: Vec<u32>,
-    instance: Vec<u32>,
-}
-
-impl Batch {
-    fn new(rays: &[Ray]) -> Self {
-        let column = |get: &dyn Fn(&Ray) -> f32| rays.iter().map(get).collect();
-        Self {
-            columns: [
-                column(&|ray| ray.origin[0]),
-                column(&|ray| ray.origin[1]),
-                column(&|ray| ray.origin[2]),
-                column(&|ray| ray.direction[0]),
-                column(&|ray| ray.direction[1]),
-                column(&|ray| ray.direction[2]),
-                column(&|ray| ray.t_max),
-            ],
-        }
-    }
-
-    fn rays(&self) -> RaysSoA<'_> {
-        let [ox, oy, oz, dx, dy, dz, t_max] = &self.columns;
-        RaysSoA { ox, oy, oz, dx, dy, dz, t_max, time: None }
-    }
-
-    fn intersect(&self, scene: &embree4_rs::CommittedScene, coherent: bool) -> Hits {
-        let len = self.rays().len();
-        let mut hits = Hits {
-            t: vec![-7.0; len],
-            u: vec![-7.0; len],
-            v: vec![-7.0; len],
-            primitive: vec![7; len],
-            geometry: vec![7; len],
-            instance: vec![7; len],
-        };
-        let out = HitsSoAMut {
-            t: &mut hits.t,
-            u: &mut hits.u,
-            v: &mut hits.v,
-            primitive: &mut hits.primitive,
-            geometry: &mut hits.geometry,
-            instance: Some(&mut hits.instance),
-        };
-        scene.intersect_batch(self.rays(), coherent, out);
-        hits
-    }
-
-    fn occluded(&self, scene: &embree4_rs::CommittedScene) -> Vec<u8> {
-        let mut out = vec![7; self.rays().len()];
-        scene.occluded_batch(self.rays(), false, &mut out);
-        out
-    }
 }
 
 #[test]
@@ -250,7 +177,9 @@ fn slices_of_different_lengths_panic() {
     };
     let scene = scene_of(&device, [triangle()]);
     let two = [0.0; 2];
-    let rays = RaysSoA { ox: &two, oy: &two, oz: &two, dx: &two, dy: &two[..1], dz: &two, t_max: &two, time: None };
+    let dy = &two[..1];
+    let rays =
+        RaysSoA { ox: &two, oy: &two, oz: &two, dx: &two, dy, dz: &two, t_max: &two, time: None, id: None, mask: None };
     scene.occluded_batch(rays, false, &mut [0; 2]);
 }
 
