@@ -2,21 +2,22 @@
 //! that closed meshes do not leak. (0 of 200,000 rays aimed at random and at edges; of those aimed exactly at a vertex
 //! 0.19 % pass between its triangles, in Embree 4.4.0. `bvh` loses none.)
 
-use super::geometry::{Geometry, Part, Primitives};
+mod build;
+mod numbers;
+
+use super::geometry::Geometry;
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use crate::error::RenderError;
-use embree4_rs::{
-    BuildQuality, CommittedScene, Device, HitsSoAMut, Library, RaysSoA, Scene, SceneFlags, TriangleGeometry,
-};
+use build::Built;
+use embree4_rs::{Device, HitsSoAMut, Library, RaysSoA};
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A committed Embree scene of one geometry a part.
+/// Committed Embree scenes: of the world, and of each object that is placed in it.
 pub struct EmbreeAccel {
-    scene: CommittedScene,
-    /// Of each geometry.
-    primitives: Vec<Primitives>,
+    built: Built,
 }
 
 /// The library that [`EmbreeAccel::build`] uses: `EMBREE_DIR`, `folders`, then the system's.
@@ -41,69 +42,89 @@ impl EmbreeAccel {
     /// # Errors
     /// Embree's own.
     pub fn build_with(geometry: impl Into<Geometry>, library: &Arc<Library>) -> Result<Self, RenderError> {
-        Self::commit(geometry.into(), library).map_err(|e| RenderError::AccelUnavailable(format!("Embree: {e}")))
+        match build::build(geometry.into(), library) {
+            Ok(built) => Ok(Self { built }),
+            Err(e) => Err(RenderError::AccelUnavailable(format!("Embree: {e}"))),
+        }
     }
 
-    fn commit(geometry: Geometry, library: &Arc<Library>) -> Result<Self, embree4_rs::Error> {
-        // A constant thread setting: the tree, and so which of two equally near triangles is found, must not depend on
-        // `--threads`.
-        let device = Device::new(library, "threads=1")?;
-        let mut scene = Scene::new(&device, SceneFlags::ROBUST, BuildQuality::Medium)?;
-        let mut primitives = Vec::new();
-        for Part { triangles, primitives: numbers, .. } in geometry.world.parts {
-            scene.attach(TriangleGeometry::new(&device, triangles.positions, triangles.indices)?)?;
-            primitives.push(numbers);
+    fn rays<'a>(&self, rays: &'a RayBatch, range: Range<usize>) -> RaysSoA<'a> {
+        RaysSoA {
+            ox: &rays.ox[range.clone()],
+            oy: &rays.oy[range.clone()],
+            oz: &rays.oz[range.clone()],
+            dx: &rays.dx[range.clone()],
+            dy: &rays.dy[range.clone()],
+            dz: &rays.dz[range.clone()],
+            t_max: &rays.t_max[range.clone()],
+            time: self.built.moves.then(|| &rays.time[range.clone()]),
+            id: self.built.is_filtered.then(|| &rays.key[range]),
+            mask: None,
         }
-        Ok(Self { scene: scene.commit()?, primitives })
     }
 }
 
-fn slices(rays: &RayBatch, range: Range<usize>) -> RaysSoA<'_> {
-    RaysSoA {
-        ox: &rays.ox[range.clone()],
-        oy: &rays.oy[range.clone()],
-        oz: &rays.oz[range.clone()],
-        dx: &rays.dx[range.clone()],
-        dy: &rays.dy[range.clone()],
-        dz: &rays.dz[range.clone()],
-        t_max: &rays.t_max[range],
-        time: None,
-        id: None,
-        mask: None,
-    }
+/// Where Embree says which instance was hit.
+#[derive(Default)]
+struct Places {
+    geometry: Vec<u32>,
+    instance: Vec<u32>,
+    place: Vec<u32>,
+}
+
+thread_local! {
+    /// One a thread, as large as the largest batch so far.
+    static PLACES: RefCell<Places> = RefCell::default();
 }
 
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-        let into = HitsSoAMut {
-            t: &mut hits.t[range.clone()],
-            u: &mut hits.u[range.clone()],
-            v: &mut hits.v[range.clone()],
-            primitive: &mut hits.primitive[range.clone()],
-            geometry: &mut hits.instance[range.clone()],
-            instance: None,
-            instance_primitive: None,
-        };
-        self.scene.intersect_batch(slices(rays, range.clone()), coherent, into);
-        // Embree numbers the triangles of each geometry from 0.
-        if let [Primitives::From(0)] = self.primitives[..] {
-            return;
+        let Built { scene, numbers, .. } = &self.built;
+        let slices = self.rays(rays, range.clone());
+        if numbers.are_the_same() {
+            let into = HitsSoAMut {
+                t: &mut hits.t[range.clone()],
+                u: &mut hits.u[range.clone()],
+                v: &mut hits.v[range.clone()],
+                primitive: &mut hits.primitive[range.clone()],
+                // The only geometry is number 0, as the world is.
+                geometry: &mut hits.instance[range],
+                instance: None,
+                instance_primitive: None,
+            };
+            return scene.intersect_batch(slices, coherent, into);
         }
-        for i in range {
-            if hits.primitive[i] != MISS {
-                let numbers = &self.primitives[hits.instance[i] as usize];
-                hits.primitive[i] = numbers.get(hits.primitive[i] as usize);
+        PLACES.with_borrow_mut(|places| {
+            let n = range.len();
+            for scratch in [&mut places.geometry, &mut places.instance, &mut places.place] {
+                scratch.resize(n.max(scratch.len()), 0);
             }
-            hits.instance[i] = 0;
-        }
+            let into = HitsSoAMut {
+                t: &mut hits.t[range.clone()],
+                u: &mut hits.u[range.clone()],
+                v: &mut hits.v[range.clone()],
+                primitive: &mut hits.primitive[range.clone()],
+                geometry: &mut places.geometry[..n],
+                instance: Some(&mut places.instance[..n]),
+                instance_primitive: Some(&mut places.place[..n]),
+            };
+            scene.intersect_batch(slices, coherent, into);
+            for (k, i) in range.enumerate() {
+                if hits.primitive[i] != MISS {
+                    let (instance, place) = (places.instance[k], places.place[k]);
+                    (hits.instance[i], hits.primitive[i]) =
+                        numbers.of(instance, place, places.geometry[k], hits.primitive[i]);
+                }
+            }
+        });
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-        self.scene.occluded_batch(slices(rays, 0..n), false, &mut occluded[..n]);
+        self.built.scene.occluded_batch(self.rays(rays, 0..n), false, &mut occluded[..n]);
     }
 
     fn stats(&self) -> AccelStats {
-        let device = self.scene.device();
+        let device = self.built.scene.device();
         AccelStats {
             name: "embree",
             version: device.version().to_string(),

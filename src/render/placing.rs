@@ -30,6 +30,9 @@ const MOST_OFFSET: f64 = 8.0;
 /// Coordinates that the scene may reach in an object's space: their squares must not leave f32.
 const MOST_CARRIED: f64 = 1e15;
 
+/// Volumes by which an object may be scaled, and their inverse: what f32 holds, and room.
+const MOST_SCALED: f64 = 1e36;
+
 /// Who decides.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
@@ -246,7 +249,9 @@ fn look(candidate: &mut Candidate, scene: &Scene, boxes: &Boxes) {
 /// `radius` from the prepared space's.
 fn can_be_placed(prepared_from_object: &DMat4, half: DVec3, radius: f64) -> bool {
     let (linear, translation) = (DMat3::from_mat4(*prepared_from_object), prepared_from_object.w_axis.truncate());
-    if !rounded(prepared_from_object).is_usable() {
+    // Embree inverts by the determinant in f32.
+    let determinant = linear.determinant().abs();
+    if !rounded(prepared_from_object).is_usable() || !(1.0 / MOST_SCALED..=MOST_SCALED).contains(&determinant) {
         return false;
     }
     let reach = |m: DMat3, v: DVec3| m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z;
