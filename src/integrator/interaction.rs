@@ -98,7 +98,23 @@ pub(super) fn interact<L: Lanes>(
             }
         }
     }
-    Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, opacity, normal, has_normal, b }
+    Interaction {
+        triangle,
+        placed,
+        p,
+        offset,
+        origin,
+        lifted,
+        wo,
+        ng,
+        front,
+        uvs,
+        color,
+        opacity,
+        normal,
+        has_normal,
+        b,
+    }
 }
 
 impl<L: Lanes> Interaction<L> {

@@ -217,3 +217,146 @@ fn unit_or_null<L: Lanes>(v: V3<L>) -> V3<L> {
     let unit = v.normalized();
     unit.masked(unit.is_finite())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::lanes::tests::at_all_levels;
+    use simd::{Float, Kernel};
+
+    /// A placement, and what of it lanes must say.
+    #[derive(Clone)]
+    struct Case {
+        linear: DMat3,
+        translation: DVec3,
+    }
+
+    impl Case {
+        fn table(&self) -> PlacementTable {
+            let mut table = PlacementTable::with_capacity(1);
+            let m = self.linear;
+            table.push([m.x_axis.as_vec3(), m.y_axis.as_vec3(), m.z_axis.as_vec3()], self.translation.as_vec3());
+            table
+        }
+
+        /// As the table has it.
+        fn rounded(&self) -> (DMat3, DVec3) {
+            let m = self.linear;
+            let column = |c: DVec3| c.as_vec3().as_dvec3();
+            (DMat3::from_cols(column(m.x_axis), column(m.y_axis), column(m.z_axis)), column(self.translation))
+        }
+    }
+
+    /// Turned, stretched with this condition number, sheared, scaled, mirrored.
+    fn cases() -> Vec<(f64, Case)> {
+        let mut all = Vec::new();
+        for k in 0..200 {
+            let a = f64::from(k);
+            let (before, after) =
+                (DMat3::from_rotation_y(a) * DMat3::from_rotation_x(2.0 * a), DMat3::from_rotation_z(0.7 * a));
+            for cond in [1.0, 10.0, 1e3, 1e6] {
+                for scale in [1.0, 1e-12, 1e12] {
+                    let side = if k % 2 == 0 { 1.0 } else { -1.0 };
+                    let stretch = DVec3::new(1.0, side / f64::sqrt(cond), 1.0 / cond) * scale;
+                    let linear = before * DMat3::from_diagonal(stretch) * after;
+                    all.push((cond, Case { linear, translation: DVec3::new(a, -2.0 * a, 0.3 * a) * scale }));
+                }
+            }
+        }
+        all
+    }
+
+    #[inline(always)]
+    fn get<L: Lanes>(v: V3<L>) -> DVec3 {
+        let mut out = [[0.0; 16]; 3];
+        v.x.store(&mut out[0], 0);
+        v.y.store(&mut out[1], 0);
+        v.z.store(&mut out[2], 0);
+        DVec3::new(f64::from(out[0][0]), f64::from(out[1][0]), f64::from(out[2][0]))
+    }
+
+    // 600 placements of each condition number.
+    #[test]
+    fn inst_02_placed_normals_go_by_the_inverse_transpose() {
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                for (cond, case) in cases() {
+                    let table = case.table();
+                    let placed = table.get::<L>(L::U::splat(1), L::M::first(L::N)).expect("a placement");
+                    let n = Vec3::new(0.48, -0.6, 0.64);
+                    let (linear, _) = case.rounded();
+                    // In units of its largest element, where f64 has no trouble with determinants.
+                    let exact = (scaled(linear).inverse().transpose() * n.as_dvec3()).normalize();
+                    let found = get(placed.normal(V3::splat(n.to_array())));
+                    let angle = found.cross(exact).length().atan2(found.dot(exact));
+                    assert!(angle <= 4e-7 * cond && (found.length() - 1.0).abs() < 1e-6, "{cond:e}: {angle:e} {found}");
+                    let zero = get(placed.normal(V3::zero()));
+                    assert_eq!(zero, DVec3::ZERO);
+                }
+            }
+        }
+        at_all_levels(Check);
+    }
+
+    #[test]
+    fn inst_03_placed_points_are_within_their_bound() {
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                for (_, case) in cases() {
+                    let table = case.table();
+                    let placed = table.get::<L>(L::U::splat(1), L::M::first(L::N)).expect("a placement");
+                    let p = Vec3::new(0.9, -0.31, 0.77);
+                    let exact = case.linear * p.as_dvec3() + case.translation;
+                    let apart = (get(placed.point(V3::splat(p.to_array()))) - exact).abs();
+                    for (i, axis) in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().enumerate() {
+                        let bound = placed.offset_length(L::F::splat(0.9), V3::splat(axis));
+                        let bound = get(V3::<L>::new(bound, bound, bound)).x;
+                        assert!(apart[i] <= 0.5 * bound, "{apart} beyond {bound:e}");
+                    }
+                }
+            }
+        }
+        at_all_levels(Check);
+    }
+
+    #[test]
+    fn lanes_of_the_world_are_left_as_they_are() {
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                let table =
+                    Case { linear: DMat3::from_diagonal(DVec3::new(-2.0, 3.0, 1.0)), translation: DVec3::X }.table();
+                let all = L::M::first(L::N);
+                assert!(table.get::<L>(L::U::splat(0), all).is_none());
+                assert!(table.get::<L>(L::U::splat(1), L::M::from_bits(0)).is_none());
+                // The first lane hit the placement, the others the world.
+                let instance = L::U::splat(1).or_else(L::M::first(1), L::U::splat(0));
+                let placed = table.get::<L>(instance, all).expect("a lane that hit a placement");
+                let (mut out, v) = ([0.0; 16], V3::<L>::splat([1.0, 0.5, 0.25]));
+                placed.point(v).x.store(&mut out, 0);
+                assert_eq!(out[0], -1.0);
+                assert!(out[1..L::N].iter().all(|&x| x == 1.0));
+                placed.handedness(L::F::one()).store(&mut out, 0);
+                assert_eq!(out[0], -1.0);
+                assert!(out[1..L::N].iter().all(|&x| x == 1.0));
+                placed.normal(v).y.store(&mut out, 0);
+                assert!(out[1..L::N].iter().all(|&x| x == 0.5));
+            }
+        }
+        at_all_levels(Check);
+    }
+}

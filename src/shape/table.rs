@@ -257,13 +257,7 @@ impl TriangleTable {
     /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`), of a triangle that is `placed`; the
     /// table must have some.
     #[inline(always)]
-    pub fn tangent<L: Lanes>(
-        &self,
-        index: L::U,
-        u: L::F,
-        v: L::F,
-        placed: &Option<Placed<L>>,
-    ) -> (V3<L>, L::F) {
+    pub fn tangent<L: Lanes>(&self, index: L::U, u: L::F, v: L::F, placed: &Option<Placed<L>>) -> (V3<L>, L::F) {
         let at = index + index + index;
         let one = L::U::splat(1);
         let t0 = at.records(&self.tangents);
