@@ -110,8 +110,7 @@ fn main() {
     for accel in [AccelChoice::Bvh, AccelChoice::Embree] {
         for entries in [0.3, 1.0, 3.0] {
             let scene = scene(n, entries);
-            let settings =
-                RenderSettings { accel, embree_dirs: vec![".embree".into()], ..RenderSettings::default() };
+            let settings = RenderSettings { accel, embree_dirs: vec![".embree".into()], ..RenderSettings::default() };
             let ready = [Choice::Never, Choice::Always].map(|choice| prepare_with(&scene, &settings, choice));
             let [Ok(merged), Ok(placed)] = ready else {
                 println!("{accel:?}: not to be had");

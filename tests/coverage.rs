@@ -11,7 +11,7 @@ use glam::{DMat4, DVec3};
 use prt::camera::{Camera, Projection};
 use prt::light::Light;
 use prt::material::{AlphaMode, Material};
-use prt::render::{AccelChoice, DefaultLight, RenderSettings};
+use prt::render::{AccelChoice, DefaultLight, RenderSettings, prepare};
 use prt::scene::{ImageId, Instance, MaterialId, Scene, SceneBuilder, TextureId};
 use prt::shape::Mesh;
 use prt::texture::{Filter, Image, Param, Texels, Texture, TextureRef, UvTransform, Wrap};
@@ -117,11 +117,39 @@ fn opacity_equal_to_the_cutoff_is_there_and_cutoff_above_one_hides_everything() 
 
 #[test]
 fn blended_sheets_let_their_share_of_light_through() {
+    // Not below the edge between a sheet's two triangles: exactly there a ray meets both.
     let sheet = || black(AlphaMode::Blend, 0.3);
-    assert_shows("one sheet", &floor_under(&[sheet()], 0.0), 0.7 * in_the_sun(), 0.01, 1.02);
-    assert_shows("two sheets", &floor_under(&[sheet(), sheet()], 0.0), 0.49 * in_the_sun(), 0.015, 1.03);
+    assert_shows("one sheet", &floor_under(&[sheet()], 0.3), 0.7 * in_the_sun(), 0.01, 1.02);
+    assert_shows("two sheets", &floor_under(&[sheet(), sheet()], 0.3), 0.49 * in_the_sun(), 0.015, 1.03);
     assert_exactly("opacity 0", &floor_under(&[black(AlphaMode::Blend, 0.0)], 0.0), in_the_sun());
     assert_exactly("opacity 1", &floor_under(&[black(AlphaMode::Blend, 1.0)], 0.0), 0.0);
+}
+
+#[test]
+fn sheets_in_one_place_each_stop_their_share() {
+    let mut scene = floor_under(&[black(AlphaMode::Blend, 0.3), black(AlphaMode::Blend, 0.3)], 0.3);
+    // The second sheet's height becomes the first one's: 49 % pass, not 70 %.
+    scene.meshes[2].positions = scene.meshes[1].positions.clone();
+    assert_shows("coinciding sheets", &scene, 0.49 * in_the_sun(), 0.015, 1.03);
+    // A camera in the sun above them sees the floor in 49 % of its rays, in the light that 49 % reach.
+    scene.cameras[0] = camera_above(3.0, POINT_VIEW);
+    scene.cameras[0].world_from_camera.w_axis.x = 0.3;
+    assert_shows("seen through them", &scene, 0.49 * 0.49 * in_the_sun(), 0.03, 1.06);
+}
+
+#[test]
+fn only_what_some_ray_may_pass_is_asked_about() {
+    // What asks no filter goes in front in so small a scene: the floor's triangles and those of sheets that are there.
+    for (mode, opacity, in_front) in [
+        (AlphaMode::Opaque, 0.0, 4),
+        (AlphaMode::Blend, 1.0, 4),
+        (AlphaMode::Blend, 0.9, 2),
+        (AlphaMode::Mask { cutoff: 0.5 }, 0.5, 4),
+        (AlphaMode::Mask { cutoff: 0.5 }, 0.4, 2),
+    ] {
+        let prepared = prepare(&floor_under(&[black(mode, opacity)], 0.0), &settings(4, 4, 0)).expect("a small scene");
+        assert_eq!(prepared.accel_report.front_triangles, in_front, "{mode:?} {opacity}");
+    }
 }
 
 #[test]
@@ -201,11 +229,19 @@ fn camera_above(y: f64, yfov: f64) -> Camera {
     Camera { name: "above".into(), world_from_camera, projection: Projection::Perspective { yfov, aspect_ratio: None } }
 }
 
-/// Blended sheets of several opacities over a floor under a lamp and the sun, seen whole.
+/// Blended sheets of several opacities and a mask of many holes over a floor under a lamp and the sun, seen whole.
 fn mixed_scene() -> Scene {
     let sheet =
         |opacity| Material { alpha_mode: AlphaMode::Blend, opacity: Param::constant(opacity), ..scenes::lambert(0.5) };
-    let mut scene = floor_under_lamp(scenes::lamp(0.5, 5.0), &[sheet(0.2), sheet(0.5), sheet(0.8)]);
+    let mut scene = floor_under_lamp(scenes::lamp(0.5, 5.0), &[sheet(0.2), sheet(0.5), sheet(0.8), sheet(0.9)]);
+    let mut builder = SceneBuilder::new(0);
+    let texels: Vec<[u8; 4]> = (0..64).map(|i| [255, 255, 255, if i % 3 == 0 { 40 } else { 250 }]).collect();
+    let texture = add_texture(&mut builder, &texels);
+    let made = builder.finish();
+    (scene.images, scene.textures) = (made.images, made.textures);
+    let mask = scene.materials.last_mut().expect("the last sheet");
+    mask.alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+    mask.opacity.texture = Some(TextureRef::plain(texture));
     scene.cameras[0] = camera_above(6.0, 1.0);
     scene
 }

@@ -146,7 +146,8 @@ fn placed_surfaces_that_are_partly_there_are_so_on_average() {
     let runs = |choice: Choice, from: u64| -> Vec<f64> { (from..from + 24).map(|seed| mean(choice, seed)).collect() };
     let (merged, placed) = (runs(Choice::Never, 0), runs(Choice::Always, 100));
     let average = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let variance = |v: &[f64]| v.iter().map(|x| (x - average(v)).powi(2)).sum::<f64>() / (v.len() * (v.len() - 1)) as f64;
+    let variance =
+        |v: &[f64]| v.iter().map(|x| (x - average(v)).powi(2)).sum::<f64>() / (v.len() * (v.len() - 1)) as f64;
     let z = (average(&merged) - average(&placed)) / (variance(&merged) + variance(&placed)).sqrt();
     println!("merged {}, placed {}: z = {z:.2}", average(&merged), average(&placed));
     assert!(z.abs() < 4.0, "merged {}, placed {}: z = {z:.2}", average(&merged), average(&placed));
@@ -159,7 +160,8 @@ fn number_of_threads_changes_no_bit_of_placed_meshes() {
     let scene = scene(|_| scenes::white_metal(0.3));
     for accel in [AccelChoice::Auto, AccelChoice::Bvh] {
         let with = |threads: usize| {
-            let pixels = pool(Some(threads)).expect("threads").install(|| picture(&scene, &small(accel), Choice::Always));
+            let pixels =
+                pool(Some(threads)).expect("threads").install(|| picture(&scene, &small(accel), Choice::Always));
             pixels.into_iter().map(|p| p.map(f32::to_bits)).collect::<Vec<_>>()
         };
         let alone = with(1);
@@ -169,7 +171,14 @@ fn number_of_threads_changes_no_bit_of_placed_meshes() {
 
 /// How many of the rays that leave `points` points of a placed mesh meet the mesh again: to both sides of single
 /// triangles, to the outside only of a convex mesh. Also the longest offset over that of the same triangle merged.
-fn self_hits(mesh: &Mesh, place: DMat4, accel: AccelChoice, points: usize, convex: bool, rng: &mut Rng) -> (usize, usize, f64) {
+fn self_hits(
+    mesh: &Mesh,
+    place: DMat4,
+    accel: AccelChoice,
+    points: usize,
+    convex: bool,
+    rng: &mut Rng,
+) -> (usize, usize, f64) {
     const DIRECTIONS: usize = 25;
     let scene = prepared::one_instance(mesh, place);
     let ready = prepared_as(&scene, accel, Choice::Always);
@@ -181,9 +190,10 @@ fn self_hits(mesh: &Mesh, place: DMat4, accel: AccelChoice, points: usize, conve
             (1, rng.below(mesh.indices.len()) as u32, u, v)
         })
         .collect();
-    let reach = scene.meshes[0].positions.iter().map(|p| {
-        (place.transform_point3(Vec3::from(*p).as_dvec3()) - ready.origin).abs().max_element()
-    });
+    let reach = scene.meshes[0]
+        .positions
+        .iter()
+        .map(|p| (place.transform_point3(Vec3::from(*p).as_dvec3()) - ready.origin).abs().max_element());
     let reach = reach.fold(0.0, f64::max);
     let (mut rays, mut from, mut longest) = (Vec::new(), Vec::new(), 0.0_f64);
     for seen in prepared::read_placed(&ready, &targets) {
@@ -223,7 +233,13 @@ fn self_01_rays_that_leave_a_placed_surface_do_not_meet_it_again() {
     let ball = prepared::mesh(ball.positions, ball.indices);
     let turn = DQuat::from_rotation_y(0.8) * DQuat::from_rotation_x(-0.4);
     let mut places = Vec::new();
-    for scale in [DVec3::splat(1e-3), DVec3::splat(0.57), DVec3::splat(1e4), DVec3::new(1.0, 2.0, 3.0), DVec3::new(-1.0, 1.0, 0.2)] {
+    for scale in [
+        DVec3::splat(1e-3),
+        DVec3::splat(0.57),
+        DVec3::splat(1e4),
+        DVec3::new(1.0, 2.0, 3.0),
+        DVec3::new(-1.0, 1.0, 0.2),
+    ] {
         for distance in [0.0, 30.0] {
             let at = distance * scale.abs().max_element() * DVec3::new(1.0, 0.3, -0.7);
             places.push(DMat4::from_scale_rotation_translation(scale, turn, at));
@@ -252,7 +268,8 @@ fn row(material: Material, meshes: usize, n: usize) -> Scene {
     let material = builder.add_material(material);
     let ids: Vec<_> = (0..meshes).map(|_| builder.add_mesh(smooth_sphere(40, 100, material))).collect();
     for i in 0..n {
-        let world_from_object = DMat4::from_translation(DVec3::new(3.0 * (i % 100) as f64, 0.0, 3.0 * (i / 100) as f64));
+        let world_from_object =
+            DMat4::from_translation(DVec3::new(3.0 * (i % 100) as f64, 0.0, 3.0 * (i / 100) as f64));
         for &mesh in &ids {
             builder.add_instance(Instance { mesh, world_from_object, name: String::from("ball") });
         }

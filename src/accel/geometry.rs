@@ -69,6 +69,18 @@ impl Primitives {
     }
 }
 
+impl Primitives {
+    /// Gives triangle `i`, the one after the last, the number `number`, higher than all before.
+    pub fn push(&mut self, i: usize, number: u32) {
+        match self {
+            Self::From(first) if i == 0 => *first = number,
+            Self::From(first) if *first + i as u32 == number => {}
+            Self::From(first) => *self = Self::Each((*first..*first + i as u32).chain([number]).collect()),
+            Self::Each(numbers) => numbers.push(number),
+        }
+    }
+}
+
 /// An object placed in the prepared space.
 #[derive(Clone, Debug)]
 pub struct Placement {
@@ -330,6 +342,18 @@ impl Geometry {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_listed_only_where_they_are_not_consecutive() {
+        let numbered = |all: &[u32]| {
+            let mut numbers = Primitives::default();
+            all.iter().enumerate().for_each(|(i, &number)| numbers.push(i, number));
+            assert!(all.iter().enumerate().all(|(i, &number)| numbers.get(i) == number), "{numbers:?}");
+            matches!(numbers, Primitives::From(_))
+        };
+        assert!(numbered(&[7, 8, 9]));
+        assert!(!numbered(&[7, 8, 10, 11, 20]));
+    }
 
     #[test]
     fn times_fall_into_the_segment_between_their_keys() {

@@ -33,8 +33,6 @@ pub(super) struct Interaction<L: Lanes> {
     pub uvs: UvSets<L>,
     /// Vertex colour; white where there is none.
     pub color: V3<L>,
-    /// Opacity of the vertex colour.
-    pub opacity: L::F,
     /// Unit normal of the front: interpolated, or geometric where the mesh has none or one that cannot be used.
     pub normal: V3<L>,
     /// Where it is interpolated.
@@ -45,7 +43,7 @@ pub(super) struct Interaction<L: Lanes> {
 
 /// Which placements were hit by the rays `at ..`: nobody asks in scenes where nothing is placed.
 #[inline(always)]
-pub(super) fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, hit: L::M) -> Option<Placed<L>> {
+fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, hit: L::M) -> Option<Placed<L>> {
     if tables.placements.is_empty() {
         return None;
     }
@@ -71,7 +69,7 @@ pub(super) fn interact<L: Lanes>(
     let front = wo.dot(triangle.ng).gt(zero);
     let ng = triangle.ng.or_else(front, -triangle.ng);
     let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
-    let (mut color, mut opacity) = (V3::splat([1.0; 3]), L::F::one());
+    let mut color = V3::splat([1.0; 3]);
     let (mut origin, mut lifted) = (p, none);
     if tables.triangles.has_attributes() {
         let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
@@ -79,7 +77,7 @@ pub(super) fn interact<L: Lanes>(
             let mut a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
             uvs = a.uvs.masked(has);
             if tables.triangles.has_colors() {
-                (color, opacity) = (a.color.or_else(has, color), a.opacity.or_else(has, opacity));
+                color = a.color.or_else(has, color);
             }
             if tables.triangles.has_normals() {
                 if let Some(placed) = &placed {
@@ -98,23 +96,7 @@ pub(super) fn interact<L: Lanes>(
             }
         }
     }
-    Interaction {
-        triangle,
-        placed,
-        p,
-        offset,
-        origin,
-        lifted,
-        wo,
-        ng,
-        front,
-        uvs,
-        color,
-        opacity,
-        normal,
-        has_normal,
-        b,
-    }
+    Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
 }
 
 impl<L: Lanes> Interaction<L> {
@@ -128,6 +110,12 @@ impl<L: Lanes> Interaction<L> {
     #[inline(always)]
     pub fn start(&self) -> V3<L> {
         robust::offset_point(self.origin, self.ng, self.offset)
+    }
+
+    /// Just behind the surface, where a ray that passes it goes on.
+    #[inline(always)]
+    pub fn behind(&self) -> V3<L> {
+        robust::offset_point(self.p, -self.ng, self.offset)
     }
 
     /// Whether `wi` leads away from the surface on the viewer's side: from the triangle, or, at a raised origin, from

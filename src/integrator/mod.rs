@@ -12,6 +12,7 @@ mod shade;
 mod terminator;
 mod wave;
 
+pub use coverage::Coverage;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;

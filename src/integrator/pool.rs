@@ -12,7 +12,7 @@ pub const POOL: usize = 2048;
 pub struct PathPool {
     /// Paths alive.
     pub n: usize,
-    /// Their next rays.
+    /// Their next rays. Keys ([`crate::sampler::coverage_key`]) are set only in scenes with partly present surfaces.
     pub rays: RayBatch,
     /// What those hit.
     pub hits: HitBatch,
@@ -20,9 +20,6 @@ pub struct PathPool {
     pub beta: [Buffer<f32>; 3],
     /// Density with which the ray's direction was sampled, 1/sr; infinite for camera rays and after a mirror.
     pub prev_pdf: Buffer<f32>,
-    /// Distance from the last scattering to the ray's origin, metres: above 0 after passing through a surface. Kept
-    /// only in scenes where that can be.
-    pub travelled: Buffer<f32>,
     /// Scatterings so far.
     pub depth: Buffer<u32>,
     /// Key of the pixel's random numbers.
@@ -43,7 +40,7 @@ pub struct PathPool {
     /// How many.
     pub n_dead: usize,
 
-    /// Rays towards lights, at most one a path.
+    /// Rays towards lights, at most one a path; keys as those of `rays`.
     pub shadow: RayBatch,
     /// How many.
     pub n_shadow: usize,
@@ -51,11 +48,6 @@ pub struct PathPool {
     pub shadow_slot: Buffer<u32>,
     /// What arrives if nothing is in between.
     pub shadow_radiance: [Buffer<f32>; 3],
-    /// What decides about partly present surfaces in between ([`crate::sampler::coverage_key`]). This and the hits are
-    /// used only in scenes that have such surfaces.
-    pub shadow_key: Buffer<u32>,
-    /// What the shadow rays hit first.
-    pub shadow_hits: HitBatch,
     /// 1 where something is in between.
     pub occluded: Vec<u8>,
 }
@@ -73,7 +65,6 @@ impl PathPool {
             hits: HitBatch::new(room),
             beta: [floats(), floats(), floats()],
             prev_pdf: floats(),
-            travelled: floats(),
             depth: ints(),
             seed: ints(),
             sample: ints(),
@@ -87,8 +78,6 @@ impl PathPool {
             n_shadow: 0,
             shadow_slot: ints(),
             shadow_radiance: [floats(), floats(), floats()],
-            shadow_key: ints(),
-            shadow_hits: HitBatch::new(room),
             occluded: vec![0; room],
         }
     }

@@ -1,6 +1,5 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
-use super::coverage::{behind, passes};
 use super::interaction::{Interaction, interact};
 use super::miss::see_environment;
 use super::normals::shading_normal;
@@ -67,18 +66,10 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
     let si = interact::<L>(tables, pool, at, primitive, hit);
     let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
-    let (mut t, mut through) = (L::F::load(&pool.hits.t, at), L::M::from_bits(0));
-    let passable = tables.materials.has_alpha() || tracer.cull_backfaces;
-    if passable {
-        t = t + L::F::load(&pool.travelled, at);
-        let key = coverage_key::<L>(key.pixel, key.sample, depth);
-        let instance = L::U::load(&pool.hits.instance, at);
-        through = passes::<L>(tables, si.triangle.material, &si.uvs, si.opacity, key, primitive, instance, hit);
-        if tracer.cull_backfaces {
-            let culled = depth.eq(L::U::splat(0)) & !si.front;
-            through = through | (tables.materials.single_sided::<L>(si.triangle.material, hit) & culled);
-        }
-        hit = hit & !through;
+    let mut culled = L::M::from_bits(0);
+    if tracer.cull_backfaces {
+        culled = tables.materials.single_sided::<L>(si.triangle.material, hit) & depth.eq(L::U::splat(0)) & !si.front;
+        hit = hit & !culled;
     }
     if tables.materials.has_unlit() {
         let unlit = tables.materials.unlit::<L>(si.triangle.material, hit);
@@ -95,7 +86,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         let le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, &si.uvs, hit);
         let lit = hit & le.max_component().gt(L::F::zero());
         if lit.any() {
-            // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2).
+            // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
+            // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
+            let t = L::F::load(&pool.hits.t, at);
             let pdf_light = si.triangle.light_density * t * t / si.wo.dot(si.triangle.ng).abs();
             let ratio = pdf_light / L::F::load(&pool.prev_pdf, at);
             let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
@@ -116,7 +109,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         let to = pool.n_shadow;
         let cast = queue_light_sample::<L>(tables, pool, &si, &bsdf, start, beta, slot, [u[0], u[1], u[2]], scatters);
         if tables.materials.has_alpha() {
-            coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow_key, to);
+            coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow.key, to);
         }
     }
 
@@ -141,17 +134,19 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
 
     let mut next = Next { origin: start, direction: sample.wi, beta, pdf: sample.pdf, depth: depth + L::U::splat(1) };
     let to = pool.n;
-    if passable {
+    if tracer.cull_backfaces {
         // Rays that pass go on as they were, from behind the surface.
         next = Next {
-            origin: behind(&si.triangle, si.p, si.offset, -si.wo).or_else(through, next.origin),
-            direction: (-si.wo).or_else(through, next.direction),
-            beta: load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at).or_else(through, next.beta),
-            pdf: L::F::load(&pool.prev_pdf, at).or_else(through, next.pdf),
-            depth: depth.or_else(through, next.depth),
+            origin: si.behind().or_else(culled, next.origin),
+            direction: (-si.wo).or_else(culled, next.direction),
+            beta: load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at).or_else(culled, next.beta),
+            pdf: L::F::load(&pool.prev_pdf, at).or_else(culled, next.pdf),
+            depth: depth.or_else(culled, next.depth),
         };
-        alive = alive | through;
-        t.masked(through).compress(alive, &mut pool.travelled, to);
+        alive = alive | culled;
+    }
+    if tables.materials.has_alpha() {
+        coverage_key::<L>(key.pixel, key.sample, next.depth).compress(alive, &mut pool.rays.key, to);
     }
 
     slot.compress(active & !alive, &mut pool.dead, pool.n_dead);

@@ -1,11 +1,10 @@
 //! The loop: refill with camera rays, intersect, shade, test shadow rays, add.
 
 use super::PathTracer;
-use super::coverage::ShadowThrough;
 use super::pool::{POOL, PathPool};
 use super::shade::Shade;
 use crate::math::V3;
-use crate::sampler::{Key, dims, pixel_seed};
+use crate::sampler::{Key, coverage_key, dims, pixel_seed};
 use simd::{Float, Kernel, Lanes, Uint, dispatch_large};
 use std::ops::Range;
 
@@ -87,11 +86,7 @@ impl PathTracer<'_> {
 
             dispatch_large(self.level, Shade { tracer: self, pool, counters });
 
-            if self.tables.materials.has_alpha() {
-                self.shadow_through(pool, counters);
-            } else {
-                self.shadow(pool, counters);
-            }
+            self.shadow(pool, counters);
             for i in 0..pool.n_dead {
                 let slot = pool.dead[i];
                 let radiance = std::mem::take(&mut pool.radiance[slot as usize]);
@@ -125,15 +120,6 @@ impl PathTracer<'_> {
             }
         }
     }
-
-    /// The same in a scene with surfaces that rays may pass: from one to the next, until all are decided.
-    fn shadow_through(&self, pool: &mut PathPool, counters: &mut Counters) {
-        while pool.n_shadow > 0 {
-            counters.shadow += pool.n_shadow as u64;
-            self.accel.intersect(&pool.shadow, 0..pool.n_shadow, false, &mut pool.shadow_hits);
-            dispatch_large(self.level, ShadowThrough { tables: self.tables, pool });
-        }
-    }
 }
 
 /// Which camera rays are still to come: pixel by pixel, sample by sample, so that neighbours in the batch are coherent.
@@ -164,7 +150,6 @@ impl Feed {
                 pool.sample[n] = self.sample;
                 pool.depth[n] = 0;
                 pool.prev_pdf[n] = f32::INFINITY;
-                pool.travelled[n] = 0.0;
                 pool.rays.ox[n] = x as f32 + 0.5;
                 pool.rays.oy[n] = y as f32 + 0.5;
                 pool.rays.t_max[n] = f32::INFINITY;
@@ -201,6 +186,9 @@ impl Kernel for Generate<'_, '_> {
         // The vector past the end spills over into the padding.
         for at in range.step_by(L::N) {
             let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
+            if tracer.tables.materials.has_alpha() {
+                coverage_key::<L>(key.pixel, key.sample, L::U::splat(0)).store(&mut pool.rays.key, at);
+            }
             let u = key.group(L::U::splat(dims::CAMERA));
             let x = L::F::load(&pool.rays.ox, at) + tracer.filter.offset::<L>(u[0]);
             let y = L::F::load(&pool.rays.oy, at) + tracer.filter.offset::<L>(u[1]);

@@ -10,6 +10,7 @@ use crate::accel::front::MOST;
 use crate::accel::geometry::{Affine, Placement};
 use crate::film::BLOCKS;
 use crate::light::{studio, table::PreparedLight};
+use crate::material::AlphaMode;
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
 use crate::shape::placement::PlacementTable;
@@ -119,7 +120,8 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
 /// What the picture of `scene` takes, all parts but `loading` and `left_over`. Nothing large is allocated to find out.
 pub fn estimate(scene: &Scene, settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let mut of_picture = of_picture(settings, files);
-    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST {
+    let is_opaque = scene.materials.iter().all(|m| m.alpha_mode == AlphaMode::Opaque);
+    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST && is_opaque {
         of_picture.program -= EMBREE_LIBRARY;
     }
     let Machinery { held, building } = Machinery::of(scene, settings);

@@ -7,6 +7,7 @@ mod features;
 mod frame;
 mod framing;
 pub mod memory;
+mod opacity;
 mod pilot;
 mod placing;
 mod prepare;

@@ -3,14 +3,15 @@
 use super::boxes::{Boxes, is_usable};
 use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::emission::mean_emissions;
+use super::opacity::Opacities;
 use super::placing::{Choice, Considered, Placing, Thing, rounded};
 use super::{AccelChoice, AccelReport, RenderSettings};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
-use crate::accel::geometry::{Geometry, Object, Part, Placement, Primitives};
-use crate::accel::{Accel, AccelStats, Triangles, linear::Linear, wide::WideBvh};
+use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
+use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
-use crate::integrator::SceneTables;
+use crate::integrator::{Coverage, SceneTables};
 use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
@@ -22,11 +23,12 @@ use crate::shape::placement::{PlacementTable, cofactor, scaled};
 use crate::shape::table::{Corners, NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use glam::{DMat3, DMat4, DVec3};
+use std::sync::Arc;
 
 /// A scene made ready to be traced.
 pub struct Prepared {
     /// What shading reads.
-    pub tables: SceneTables,
+    pub tables: Arc<SceneTables>,
     /// What rays hit.
     pub accel: Box<dyn Accel>,
     /// Which backend and why.
@@ -75,6 +77,32 @@ struct Totals {
 /// the range of f32. Paths still find what they emit.
 const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
 
+/// Triangles of the world or of an object: those that stop every ray, and those whose hits are to be asked about.
+struct Parts {
+    opaque: Part,
+    filtered: Part,
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        Self { opaque: Part::default(), filtered: Part { filtered: true, ..Part::default() } }
+    }
+}
+
+impl Parts {
+    /// Where triangles go that let some rays pass, or none.
+    fn of(&mut self, lets_rays_pass: bool) -> &mut Part {
+        if lets_rays_pass { &mut self.filtered } else { &mut self.opaque }
+    }
+
+    /// What backends are built from.
+    fn object(self) -> Object {
+        let mut parts = vec![self.opaque, self.filtered];
+        parts.retain(|part| !part.triangles.indices.is_empty());
+        Object { parts, shapes: Vec::new() }
+    }
+}
+
 /// Prepares `scene`.
 ///
 /// # Errors
@@ -102,23 +130,22 @@ pub fn prepare_with(scene: &Scene, settings: &RenderSettings, choice: Choice) ->
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
     let materials = MaterialTable::new(&scene.materials, &mut textures);
     let mut triangles = TriangleTable::with_capacity(count as usize);
-    let mut geometry = Triangles::default();
+    let mut parts = Parts::default();
     let mut lights = Vec::new();
-    let emissions = mean_emissions(scene);
+    let (emissions, opacities) = (mean_emissions(scene), Opacities::new(scene));
     let mut totals = Totals::default();
     for instance in scene.instances.iter().zip(&placing.is_merged).filter_map(|(i, merged)| merged.then_some(i)) {
         let mesh = &scene.meshes[instance.mesh.index()];
         let map = &instance.world_from_object;
         let lights = Some(&mut lights);
-        flatten(scene, mesh, map, origin, &emissions, &mut geometry, &mut triangles, lights, &mut totals);
+        flatten(scene, mesh, map, origin, &emissions, &opacities, &mut parts, &mut triangles, lights, &mut totals);
     }
-    let mut geometry = Geometry::from(geometry);
-    geometry.world.parts.retain(|part| !part.triangles.indices.is_empty());
+    let mut geometry = Geometry { world: parts.object(), ..Geometry::default() };
     let mut placements = PlacementTable::with_capacity(placing.placements());
     let mut seen = triangles.len() as u64;
     for thing in &placing.things {
         let before = triangles.len();
-        geometry.objects.push(object(scene, thing, &emissions, &mut triangles, &mut totals));
+        geometry.objects.push(object(scene, thing, &emissions, &opacities, &mut triangles, &mut totals));
         seen += (triangles.len() - before) as u64 * thing.instances.len() as u64;
         let object = (geometry.objects.len() - 1) as u32;
         for map in thing.places(scene, origin) {
@@ -158,8 +185,10 @@ pub fn prepare_with(scene: &Scene, settings: &RenderSettings, choice: Choice) ->
         warnings.push(default_light.darkness(scene));
     }
     let lights = LightTable::new(&lights, environment, &mut triangles);
+    let tables = Arc::new(SceneTables { triangles, placements, materials, textures, lights });
+    let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
+    geometry.filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(&tables))) as Arc<dyn HitFilter>);
     let (accel, accel_report) = build_accel(geometry, settings)?;
-    let tables = SceneTables { triangles, placements, materials, textures, lights };
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, placed, warnings, losses })
 }
 
@@ -177,16 +206,16 @@ fn object(
     scene: &Scene,
     thing: &Thing,
     emissions: &[[f64; 3]],
+    opacities: &Opacities,
     table: &mut TriangleTable,
     totals: &mut Totals,
 ) -> Object {
-    let (mut triangles, first) = (Triangles::default(), table.len() as u32);
+    let mut parts = Parts::default();
     for mesh in &thing.meshes {
         let mesh = &scene.meshes[mesh.index()];
-        flatten(scene, mesh, &DMat4::IDENTITY, thing.centre, emissions, &mut triangles, table, None, totals);
+        flatten(scene, mesh, &DMat4::IDENTITY, thing.centre, emissions, opacities, &mut parts, table, None, totals);
     }
-    let part = Part { triangles, primitives: Primitives::From(first), ..Part::default() };
-    Object { parts: vec![part], shapes: Vec::new() }
+    parts.object()
 }
 
 /// Adds the surface of a placed thing, at all its places, to `surface`.
@@ -247,7 +276,8 @@ fn flatten(
     world_from_object: &DMat4,
     origin: DVec3,
     emissions: &[[f64; 3]],
-    geometry: &mut Triangles,
+    opacities: &Opacities,
+    parts: &mut Parts,
     table: &mut TriangleTable,
     mut lights: Option<&mut Vec<(PreparedLight, f64)>>,
     totals: &mut Totals,
@@ -258,8 +288,10 @@ fn flatten(
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
     let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
-    let first = geometry.positions.len() as u32;
-    geometry.positions.extend(mesh.positions.iter().map(|&p| {
+    let part = parts.of(opacities.let_rays_pass(scene, mesh));
+    let triangles = &mut part.triangles;
+    let first = triangles.positions.len() as u32;
+    triangles.positions.extend(mesh.positions.iter().map(|&p| {
         let p = world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
         (p - origin).as_vec3().to_array()
     }));
@@ -276,7 +308,7 @@ fn flatten(
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
         let [j, k] = if mirrors { [k, j] } else { [j, k] };
-        let corner = |v: u32| glam::Vec3::from(geometry.positions[(first + v) as usize]);
+        let corner = |v: u32| glam::Vec3::from(triangles.positions[(first + v) as usize]);
         let corners = [corner(i), corner(j), corner(k)];
         // In f64: the f32 product of edges below 3e-10 underflows.
         let edges = corners.map(|c| c.as_dvec3());
@@ -311,7 +343,8 @@ fn flatten(
             }))
         });
         let primitive = table.len() as u32;
-        geometry.indices.push([i, j, k].map(|v| first + v));
+        part.primitives.push(triangles.indices.len(), primitive);
+        triangles.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
         if average > 0.0
             && area > LEAST_SAMPLED_AREA

@@ -53,19 +53,20 @@ impl<L: Lanes> Key<L> {
     }
 }
 
-/// What decides, with the instance and the primitive, whether a ray after `bounce` scatterings passes through a surface that is partly
-/// there: a function of names alone, so that every backend and every order of hits decides the same.
+/// What decides, with instance and primitive, whether a ray after `bounce` scatterings passes through a surface that is
+/// partly there: a function of names alone, so that every backend and every order of hits decides the same.
 #[inline(always)]
 pub fn coverage_key<L: Lanes>(pixel: L::U, sample: L::U, bounce: L::U) -> L::U {
     mix::<L>(pixel + mix::<L>(sample ^ bounce.shl(20) ^ L::U::splat(0x1b56_c4e9)))
 }
 
-/// A number in [0, 1) for a [`coverage_key`], an instance and a primitive; a ray passes where the coverage is not above
-/// it. Instance 0, the world, adds nothing to the hash, so a scene without placements need not know of them.
+/// A number in [0, 1) for a [`coverage_key`] and a primitive of an instance; a ray passes where the coverage is not above
+/// it.
 #[inline(always)]
 pub fn coverage_number<L: Lanes>(key: L::U, instance: L::U, primitive: L::U) -> L::F {
-    // `mix` keeps 0.
-    to_unit::<L>(mix::<L>(key ^ mix::<L>(primitive + L::U::splat(0x632b_e5ab)) ^ mix::<L>(instance)))
+    // Each instance is as another ray to its primitives; `mix` of 0, the world, is 0.
+    let key = key ^ mix::<L>(instance);
+    to_unit::<L>(mix::<L>(key ^ mix::<L>(primitive + L::U::splat(0x632b_e5ab))))
 }
 
 /// The top 24 bits as a number in [0, 1): rounding can never give 1.

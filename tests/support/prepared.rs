@@ -60,7 +60,7 @@ pub fn prepared_as(scene: &Scene, accel: AccelChoice, choice: Choice) -> Prepare
 /// The backends that run here.
 pub fn backends() -> Vec<AccelChoice> {
     let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
-    let mut all = vec![AccelChoice::Linear, AccelChoice::Bvh];
+    let mut all = vec![AccelChoice::Linear];
     match prt::accel::embree::find(&[folder]) {
         Ok(_) => all.push(AccelChoice::Embree),
         Err(why) => println!("skipped: no Embree library ({why})"),

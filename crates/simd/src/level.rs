@@ -91,6 +91,12 @@ pub fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
     if level == Level::Portable8 { kernel.run::<Portable8>() } else { dispatch_large(level, kernel) }
 }
 
+/// Runs `kernel` at [`Level::Scalar`], for work that comes one at a time: nothing wider is compiled.
+#[inline(always)]
+pub fn dispatch_one<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Scalar>()
+}
+
 /// [`dispatch`] for a kernel that is large enough for its build time to matter: never at [`Level::Portable8`], whose
 /// plain code is five times that of AVX-512. [`Level::without_portable`] takes its place by one lane.
 ///

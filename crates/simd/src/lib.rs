@@ -22,4 +22,4 @@ mod level;
 
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
-pub use level::{Kernel, Level, dispatch, dispatch_large};
+pub use level::{Kernel, Level, dispatch, dispatch_large, dispatch_one};
