@@ -217,7 +217,10 @@ fn inst_01_a_placed_mesh_is_its_baked_mesh() {
             let n = if accel == AccelChoice::Linear { 2000 } else { 100_000 };
             let rays = rays(&mesh, placed, n, &mut Rng::new(1));
             let (a, b) = (prepared_as(&instance, accel, Choice::Always), prepared_as(&baked, accel, Choice::Never));
-            assert_eq!((a.tables.placements.len(), a.origin), (1, b.origin), "{name}");
+            // What would lose digits when placed is merged, and tested above.
+            let is_extreme = ["(1e-3, 1, 1e3)", "nearly singular (1, 1, 1e-6)"].contains(&name);
+            let expected = if is_extreme { (0, 0) } else { (1, 0) };
+            assert_eq!((a.tables.placements.len(), b.tables.placements.len()), expected, "{name}");
             assert_eq!(a.tables.triangles.len(), mesh.indices.len());
             let found = differences(&a, &b, &mesh, placed, &rays);
             println!("{name}, {accel:?}: {found:?}");

@@ -229,7 +229,7 @@ fn self_01_rays_that_leave_a_placed_surface_do_not_meet_it_again() {
     let mut rng = Rng::new(11);
     let soup = meshes::random_soup(400, 0.3, 1.0, Vec3::ZERO, &mut rng);
     let soup = prepared::mesh(soup.positions, soup.indices);
-    let ball = meshes::sphere(24, 48, || 1.0);
+    let ball = smooth_sphere(24, 48, MaterialId(0));
     let ball = prepared::mesh(ball.positions, ball.indices);
     let turn = DQuat::from_rotation_y(0.8) * DQuat::from_rotation_x(-0.4);
     let mut places = Vec::new();

@@ -30,6 +30,9 @@ const RAYS: f64 = 1e8;
 const MOST_MERGED: u64 = 60_000_000;
 /// Times by which placing may lengthen the offset of ray origins; what would lose more precision is merged.
 const MOST_OFFSET: f64 = 8.0;
+/// Times by which an object may be stretched in one direction more than in another: its normals are rounded to f32
+/// before they are carried, and the stretch magnifies that.
+const MOST_STRETCHED: f64 = 1e3;
 /// Coordinates that the scene may reach in an object's space: their squares must not leave f32.
 const MOST_CARRIED: f64 = 1e15;
 
@@ -272,11 +275,13 @@ fn can_be_placed(prepared_from_object: &DMat4, half: DVec3, radius: f64) -> bool
         return false;
     }
     let reach = |m: DMat3, v: DVec3| m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z;
+    let size = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+    let stretch = size(linear) * size(linear.inverse());
     let carried = reach(linear.inverse(), DVec3::splat(radius) + translation.abs()).max_element();
     let error = PlacementError::of(linear, translation).at(half.max_element()).max_element();
     let merged = f64::from(gamma(16)) * (reach(linear, half) + translation.abs()).max_element();
     // Written so that NaN is refused.
-    carried <= MOST_CARRIED && error <= MOST_OFFSET * merged
+    carried <= MOST_CARRIED && stretch <= MOST_STRETCHED && error <= MOST_OFFSET * merged
 }
 
 /// Decides about each of `candidates` of a scene of so many `triangles`, all instances counted.
@@ -357,6 +362,7 @@ mod tests {
             (at(DMat4::from_scale(DVec3::new(-1.0, 2.0, 0.5)), 10.0), true),
             (at(turned * DMat4::from_scale(DVec3::splat(1e-4)), 10.0), true),
             (at(turned * DMat4::from_scale(DVec3::splat(1e-20)), 10.0), false),
+            (at(DMat4::from_scale(DVec3::new(1e-3, 1.0, 1e3)), 10.0), false),
             (at(turned * DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0)), 10.0), false),
             (at(turned * DMat4::from_scale(DVec3::new(1.0, 1.0, 1e-5)) * turned, 10.0), false),
         ] {

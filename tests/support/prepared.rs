@@ -57,7 +57,7 @@ pub fn prepared_as(scene: &Scene, accel: AccelChoice, choice: Choice) -> Prepare
     prepare_with(scene, &settings, choice).expect("a small scene")
 }
 
-/// The backends that run here.
+/// The backends that have placements and run here; `bvh` joins when it has them.
 pub fn backends() -> Vec<AccelChoice> {
     let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
     let mut all = vec![AccelChoice::Linear];

@@ -158,7 +158,7 @@ fn camera_text(camera: &CameraPlan) -> String {
 
 /// What became of something that has several instances.
 fn placing_text(thing: &Considered) -> String {
-    let more = if thing.meshes > 1 { format!(" and {} more meshes", thing.meshes - 1) } else { String::new() };
+    let more = if thing.meshes > 1 { format!(" ({} meshes)", thing.meshes) } else { String::new() };
     let became = match thing.placed {
         0 => String::from("merged"),
         n if n == thing.instances => String::from("placed"),
