@@ -75,7 +75,7 @@ fn a_plan_says_what_is_placed_and_why() {
     for part in [
         "50,155,202 placed (1,550 in the file), 1,550 held; 3 meshes, 64,801 instances",
         "(2 meshes), 1,548 triangles x 32,400: placed (merging it would cost more; merging 35 s, placing 24 s)",
-        "features   default_light, instances",
+        "features   default_light, environment, instances",
     ] {
         assert!(said.contains(part), "{part:?} in {said}");
     }
