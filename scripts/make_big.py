@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
-"""Writes two large files for timing the loader: make_big.py FOLDER [MB] [NODES].
+"""Writes large files: make_big.py FOLDER [MB] [NODES] for timing the loader, make_big.py FOLDER placed [INSTANCES] for
+instances.
 
 FOLDER/big.glb    one mesh of about MB megabytes (default 190): a wavy grid with normals, coordinates, 32-bit indices
 FOLDER/nodes.gltf NODES nodes (default 200000, 14 MB of JSON) that place one triangle
+FOLDER/placed.glb INSTANCES (default 1000000) of one mesh of 10,000 triangles, by EXT_mesh_gpu_instancing
 """
 import array
 import base64
 import json
 import math
+import random
 import struct
 import sys
 import zlib
@@ -69,6 +72,55 @@ def nodes(path, count):
     path.write_text(json.dumps(root))
 
 
+def placed(path, count):
+    """Bumpy balls on a wavy field, turned and scaled at random."""
+    rows, columns = 50, 100
+    balls, indices = (array.array(t) for t in "fI")
+    for row in range(rows + 1):
+        theta = math.pi * row / rows
+        for column in range(columns):
+            phi = 2 * math.pi * column / columns
+            r = 0.4 * (1 + 0.12 * math.sin(7 * phi) * math.sin(9 * theta))
+            balls.extend((r * math.sin(theta) * math.cos(phi), r * math.cos(theta), -r * math.sin(theta) * math.sin(phi)))
+    for row in range(rows):
+        for column in range(columns):
+            a, b = row * columns + column, row * columns + (column + 1) % columns
+            indices.extend((a, a + columns, b + columns, a, b + columns, b))
+    rng, side = random.Random(5), max(1, math.isqrt(count))
+    moves, turns, sizes = (array.array("f") for _ in range(3))
+    for i in range(count):
+        x, z = i % side + rng.random(), i // side + rng.random()
+        moves.extend((x, 3 * math.sin(0.02 * x) * math.cos(0.017 * z), z))
+        half = math.pi * rng.random()
+        turns.extend((0.0, math.sin(half), 0.0, math.cos(half)))
+        s = 0.6 + rng.random()
+        sizes.extend((s, s * (0.7 + 0.6 * rng.random()), s))
+    parts = [p.tobytes() for p in (balls, indices, moves, turns, sizes)]
+    views, offset = [], 0
+    for part in parts:
+        views.append({"buffer": 0, "byteOffset": offset, "byteLength": len(part)})
+        offset += len(part)
+    accessor = lambda view, component, kind, n: {"bufferView": view, "componentType": component, "type": kind, "count": n}
+    root = {
+        "asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}], "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {
+                      "attributes": {"TRANSLATION": 2, "ROTATION": 3, "SCALE": 4}}}},
+                  {"camera": 0, "translation": [side / 2, 25, side + 20], "rotation": [-0.17, 0, 0, 0.98545]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "meshes": [{"name": "ball", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [accessor(0, 5126, "VEC3", len(balls) // 3), accessor(1, 5125, "SCALAR", len(indices)),
+                      accessor(2, 5126, "VEC3", count), accessor(3, 5126, "VEC4", count),
+                      accessor(4, 5126, "VEC3", count)],
+        "bufferViews": views, "buffers": [{"byteLength": offset}],
+    }
+    text = json.dumps(root).encode()
+    text += b" " * (-len(text) % 4)
+    with open(path, "wb") as out:
+        out.write(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + offset, len(text), JSON) + text)
+        out.write(struct.pack("<II", offset, BIN))
+        out.writelines(parts)
+
+
 def pixel():
     """A PNG of one white pixel, base64."""
     chunk = lambda kind, data: (struct.pack(">I", len(data)) + kind + data
@@ -83,5 +135,8 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
+    if sys.argv[2:3] == ["placed"]:
+        placed(folder / "placed.glb", int(sys.argv[3]) if len(sys.argv) > 3 else 1_000_000)
+        sys.exit()
     big(folder / "big.glb", float(sys.argv[2]) if len(sys.argv) > 2 else 190)
     nodes(folder / "nodes.gltf", int(sys.argv[3]) if len(sys.argv) > 3 else 200_000)

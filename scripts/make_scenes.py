@@ -12,9 +12,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from scene_kit import lights, objects, rooms
+from scene_kit import forest, lights, objects, rooms
 
-SCENES = (rooms.cornell, rooms.wall, rooms.knot, lights.lights, lights.punctual, objects.metals, objects.stilllife)
+SCENES = (rooms.cornell, rooms.wall, rooms.knot, lights.lights, lights.punctual, objects.metals, objects.stilllife,
+          forest.forest)
 FOLDER = Path(__file__).resolve().parent.parent / "scenes"
 KEPT = {"README.md"}
 

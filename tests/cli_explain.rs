@@ -66,6 +66,33 @@ fn a_plan_is_told_in_ascii_and_nothing_is_written() {
     assert_eq!(entries(root.path()), ["a.gltf", "broken.gltf"]);
 }
 
+#[test]
+fn a_plan_says_what_is_placed_and_why() {
+    let root = tempfile::tempdir().unwrap();
+    let forest = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/forest.gltf");
+    let args = [forest, "--explain", "--size", "32x18", "-s", "1", "--accel", "bvh"];
+    let said = text(&prt_in(root.path(), &args).stdout);
+    for part in [
+        "50,155,202 placed (1,550 in the file), 1,550 held; 3 meshes, 64,801 instances",
+        "(2 meshes), 1,548 triangles x 32,400: placed (merging it would cost more; merging 35 s, placing 24 s)",
+        "features   default_light, environment, instances",
+    ] {
+        assert!(said.contains(part), "{part:?} in {said}");
+    }
+    let plan = json(&prt_in(root.path(), &[&args[..], &["--json"]].concat()));
+    let plan = &plan["images"][0];
+    assert_eq!((&plan["triangles"]["stored"], &plan["placed_instances"]), (&1550.into(), &32_400.into()));
+    let [thing] = &plan["placing"].as_array().unwrap()[..] else { panic!("{plan}") };
+    assert_eq!((&thing["placed"], &thing["instances"], &thing["meshes"]), (&32_400.into(), &32_400.into(), &2.into()));
+    // Merged it would take gigabytes.
+    assert!(plan["memory"]["peak"].as_u64().unwrap() < 200 << 20, "{plan}");
+    // Two boxes of one mesh are not worth it.
+    let cornell = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.gltf");
+    let said =
+        text(&prt_in(root.path(), &[cornell, "--explain", "--size", "32x18", "-s", "1", "--accel", "bvh"]).stdout);
+    assert!(said.contains("12 triangles x 2: merged (placing it would cost rays more;"), "{said}");
+}
+
 /// The plan of every scene of ours says what the render of it says afterwards.
 #[test]
 fn a_plan_agrees_with_the_render_that_follows() {

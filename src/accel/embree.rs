@@ -2,38 +2,22 @@
 //! that closed meshes do not leak. (0 of 200,000 rays aimed at random and at edges; of those aimed exactly at a vertex
 //! 0.19 % pass between its triangles, in Embree 4.4.0. `bvh` loses none.)
 
-use super::geometry::{self, Geometry, HitFilter, Part, Primitives};
+mod build;
+mod numbers;
+
+use super::geometry::Geometry;
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use crate::error::RenderError;
-use embree4_rs::{
-    BuildQuality, Candidate, CommittedScene, Device, Filter, HitsSoAMut, Library, RaysSoA, Scene, SceneFlags,
-    TriangleGeometry,
-};
+use build::Built;
+use embree4_rs::{Device, HitsSoAMut, Library, RaysSoA};
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A committed Embree scene of one geometry a part.
+/// Committed Embree scenes: of the world, and of each object that is placed in it.
 pub struct EmbreeAccel {
-    scene: CommittedScene,
-    /// Of each geometry.
-    primitives: Vec<Arc<Primitives>>,
-    /// Whether rays must tell their keys.
-    is_filtered: bool,
-}
-
-/// The geometry's filter on one part.
-struct PartFilter {
-    filter: Arc<dyn HitFilter>,
-    primitives: Arc<Primitives>,
-}
-
-impl Filter for PartFilter {
-    fn accept(&self, candidate: &Candidate) -> bool {
-        let &Candidate { ray_id, primitive, u, v, .. } = candidate;
-        let primitive = self.primitives.get(primitive as usize);
-        self.filter.stops(&geometry::Candidate { key: ray_id, instance: 0, primitive, u, v })
-    }
+    built: Built,
 }
 
 /// The library that [`EmbreeAccel::build`] uses: `EMBREE_DIR`, `folders`, then the system's.
@@ -58,33 +42,13 @@ impl EmbreeAccel {
     /// # Errors
     /// Embree's own.
     pub fn build_with(geometry: impl Into<Geometry>, library: &Arc<Library>) -> Result<Self, RenderError> {
-        Self::commit(geometry.into(), library).map_err(|e| RenderError::AccelUnavailable(format!("Embree: {e}")))
-    }
-
-    fn commit(geometry: Geometry, library: &Arc<Library>) -> Result<Self, embree4_rs::Error> {
-        // A constant thread setting: the tree, and so which of two equally near triangles is found, must not depend on
-        // `--threads`.
-        let device = Device::new(library, "threads=1")?;
-        let mut scene = Scene::new(&device, SceneFlags::ROBUST, BuildQuality::Medium)?;
-        let (mut primitives, mut is_filtered) = (Vec::new(), false);
-        for Part { triangles, primitives: numbers, filtered, .. } in geometry.world.parts {
-            let numbers = Arc::new(numbers);
-            let mut mesh = TriangleGeometry::new(&device, triangles.positions, triangles.indices)?;
-            if filtered {
-                // Without a filter nothing stops there.
-                let Some(filter) = geometry.filter.clone() else { continue };
-                mesh.set_filter(Arc::new(PartFilter { filter, primitives: Arc::clone(&numbers) }))?;
-                is_filtered = true;
-            }
-            scene.attach(mesh)?;
-            primitives.push(numbers);
+        match build::build(geometry.into(), library) {
+            Ok(built) => Ok(Self { built }),
+            Err(e) => Err(RenderError::AccelUnavailable(format!("Embree: {e}"))),
         }
-        Ok(Self { scene: scene.commit()?, primitives, is_filtered })
     }
-}
 
-impl EmbreeAccel {
-    fn slices<'a>(&self, rays: &'a RayBatch, range: Range<usize>) -> RaysSoA<'a> {
+    fn rays<'a>(&self, rays: &'a RayBatch, range: Range<usize>) -> RaysSoA<'a> {
         RaysSoA {
             ox: &rays.ox[range.clone()],
             oy: &rays.oy[range.clone()],
@@ -93,46 +57,74 @@ impl EmbreeAccel {
             dy: &rays.dy[range.clone()],
             dz: &rays.dz[range.clone()],
             t_max: &rays.t_max[range.clone()],
-            time: None,
-            id: self.is_filtered.then(|| &rays.key[range]),
+            time: self.built.moves.then(|| &rays.time[range.clone()]),
+            id: self.built.is_filtered.then(|| &rays.key[range]),
             mask: None,
         }
     }
 }
 
+/// Where Embree says which instance was hit.
+#[derive(Default)]
+struct Places {
+    geometry: Vec<u32>,
+    instance: Vec<u32>,
+    place: Vec<u32>,
+}
+
+thread_local! {
+    /// One a thread, as large as the largest batch so far.
+    static PLACES: RefCell<Places> = RefCell::default();
+}
+
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-        let into = HitsSoAMut {
-            t: &mut hits.t[range.clone()],
-            u: &mut hits.u[range.clone()],
-            v: &mut hits.v[range.clone()],
-            primitive: &mut hits.primitive[range.clone()],
-            geometry: &mut hits.instance[range.clone()],
-            instance: None,
-            instance_primitive: None,
-        };
-        self.scene.intersect_batch(self.slices(rays, range.clone()), coherent, into);
-        // Embree numbers the triangles of each geometry from 0.
-        if let [numbers] = &self.primitives[..]
-            && matches!(**numbers, Primitives::From(0))
-        {
-            return;
+        let Built { scene, numbers, .. } = &self.built;
+        let slices = self.rays(rays, range.clone());
+        if numbers.are_the_same() {
+            let into = HitsSoAMut {
+                t: &mut hits.t[range.clone()],
+                u: &mut hits.u[range.clone()],
+                v: &mut hits.v[range.clone()],
+                primitive: &mut hits.primitive[range.clone()],
+                // The only geometry is number 0, as the world is.
+                geometry: &mut hits.instance[range],
+                instance: None,
+                instance_primitive: None,
+            };
+            return scene.intersect_batch(slices, coherent, into);
         }
-        for i in range {
-            if hits.primitive[i] != MISS {
-                let numbers = &self.primitives[hits.instance[i] as usize];
-                hits.primitive[i] = numbers.get(hits.primitive[i] as usize);
+        PLACES.with_borrow_mut(|places| {
+            let n = range.len();
+            for scratch in [&mut places.geometry, &mut places.instance, &mut places.place] {
+                scratch.resize(n.max(scratch.len()), 0);
             }
-            hits.instance[i] = 0;
-        }
+            let into = HitsSoAMut {
+                t: &mut hits.t[range.clone()],
+                u: &mut hits.u[range.clone()],
+                v: &mut hits.v[range.clone()],
+                primitive: &mut hits.primitive[range.clone()],
+                geometry: &mut places.geometry[..n],
+                instance: Some(&mut places.instance[..n]),
+                instance_primitive: Some(&mut places.place[..n]),
+            };
+            scene.intersect_batch(slices, coherent, into);
+            for (k, i) in range.enumerate() {
+                if hits.primitive[i] != MISS {
+                    let (instance, place) = (places.instance[k], places.place[k]);
+                    (hits.instance[i], hits.primitive[i]) =
+                        numbers.of(instance, place, places.geometry[k], hits.primitive[i]);
+                }
+            }
+        });
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-        self.scene.occluded_batch(self.slices(rays, 0..n), false, &mut occluded[..n]);
+        self.built.scene.occluded_batch(self.rays(rays, 0..n), false, &mut occluded[..n]);
     }
 
     fn stats(&self) -> AccelStats {
-        let device = self.scene.device();
+        let device = self.built.scene.device();
         AccelStats {
             name: "embree",
             version: device.version().to_string(),

@@ -34,6 +34,7 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.truncated = Some(stats.truncated);
     image.triangles = Some(stats.triangles);
     image.instances = Some(stats.instances);
+    image.placed_instances = Some(stats.placed_instances);
     image.lights = Some(stats.lights);
     image.default_light = Some(report::DefaultLight {
         requested: default_light_name(stats.default_light.requested).into(),

@@ -18,7 +18,7 @@ use crate::camera::{Camera, Projection};
 use crate::light::Light;
 use crate::load::{LoadEstimate, LoadTimes, load};
 use crate::render::memory::{MemoryEstimate, texel_bytes};
-use crate::render::{self, Prepared, RenderSettings, features, pilot, prepare};
+use crate::render::{self, Considered, Prepared, RenderSettings, features, pilot, prepare};
 use crate::scene::{Scene, Skipped};
 use crate::texture::{Image, Texels};
 use serde::Serialize;
@@ -70,6 +70,10 @@ pub struct Explanation {
     pub triangles: Option<TrianglePlan>,
     pub meshes: Option<usize>,
     pub instances: Option<usize>,
+    /// Placements of what is not merged into the world; meshes with the same places count once.
+    pub placed_instances: Option<u64>,
+    /// What has several instances, and whether they are merged or placed.
+    pub placing: Vec<Considered>,
     pub materials: Option<usize>,
     pub textures: Vec<TexturePlan>,
     pub texture_bytes: u64,
@@ -109,6 +113,8 @@ pub struct TrianglePlan {
     pub placed: u64,
     /// Without those that have no area or are out of range once placed.
     pub traced: u64,
+    /// Held for that: those of a mesh that is not merged into the world once.
+    pub stored: u64,
 }
 
 /// An image that textures read.
@@ -333,7 +339,7 @@ impl File<'_> {
         plan.texture_bytes = plan.textures.iter().map(|texture| texture.bytes).sum();
         let (file, placed) =
             (scene.meshes.iter().map(|mesh| mesh.indices.len() as u64).sum(), scene.triangle_count() as u64);
-        plan.triangles = Some(TrianglePlan { file, placed, traced: placed });
+        plan.triangles = Some(TrianglePlan { file, placed, traced: placed, stored: placed });
     }
 
     /// The rest; `prepared` is the scene made ready, for the first of its images that needs it.
@@ -442,8 +448,10 @@ fn describe_prepared(scene: &Scene, prepared: &Prepared, plan: &mut Explanation)
     plan.front_triangles = Some(accel.front_triangles);
     plan.features = features(scene, prepared).into_iter().map(|(name, has)| (name.into(), has)).collect();
     if let Some(triangles) = &mut plan.triangles {
-        triangles.traced = tables.triangles.len() as u64;
+        (triangles.traced, triangles.stored) = (prepared.placed.triangles, prepared.placed.stored);
     }
+    plan.placed_instances = Some(prepared.placed.instances);
+    plan.placing.clone_from(&prepared.placed.considered);
     plan.warnings.extend(prepared.warnings.iter().cloned());
     plan.losses.extend(prepared.losses.iter().cloned());
     plan.notes.extend(light.note());

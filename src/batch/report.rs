@@ -72,6 +72,7 @@ pub struct ImageReport {
     pub peak_rss_bytes: Option<u64>,
     pub triangles: Option<u64>,
     pub instances: Option<u64>,
+    pub placed_instances: Option<u64>,
     pub lights: Option<u64>,
     pub default_light: Option<DefaultLight>,
     pub features: BTreeMap<String, bool>,

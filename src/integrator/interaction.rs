@@ -4,15 +4,22 @@ use super::SceneTables;
 use super::pool::PathPool;
 use super::shade::load3;
 use super::terminator::lift;
+use crate::accel::HitBatch;
 use crate::math::{UvSets, V3, robust};
-use crate::shape::table::{NONE, Triangle};
+use crate::shape::placement::Placed;
+use crate::shape::table::{NONE, Triangle, interpolate3};
 use simd::{Float, Lanes, Mask, Uint};
 
 /// Where a path hit and how it looks from there.
 pub(super) struct Interaction<L: Lanes> {
+    /// In the prepared space.
     pub triangle: Triangle<L>,
+    /// Where it is placed, for what is read of it besides; `None` where that is the world in all lanes.
+    pub placed: Option<Placed<L>>,
     /// Hit point, from barycentric coordinates.
     pub p: V3<L>,
+    /// How far rays that leave are moved off the surface, metres.
+    pub offset: L::F,
     /// Where light is gathered: the hit point, raised by [`lift`] where the mesh stands for a rounder surface.
     pub origin: V3<L>,
     /// Where it is raised.
@@ -34,6 +41,15 @@ pub(super) struct Interaction<L: Lanes> {
     pub b: [L::F; 2],
 }
 
+/// Which placements were hit by the rays `at ..`: nobody asks in scenes where nothing is placed.
+#[inline(always)]
+fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, hit: L::M) -> Option<Placed<L>> {
+    if tables.placements.is_empty() {
+        return None;
+    }
+    tables.placements.get::<L>(L::U::load(&hits.instance, at), hit)
+}
+
 /// Geometry of the hits.
 #[inline(always)]
 pub(super) fn interact<L: Lanes>(
@@ -47,22 +63,30 @@ pub(super) fn interact<L: Lanes>(
     let none = L::M::from_bits(0);
     let triangle = tables.triangles.get::<L>(primitive);
     let b = [L::F::load(&pool.hits.u, at), L::F::load(&pool.hits.v, at)];
+    let placed = placed::<L>(tables, &pool.hits, at, hit);
+    let (triangle, p, offset) = triangle.placed(&placed, triangle.point(b[0], b[1]));
     let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
     let front = wo.dot(triangle.ng).gt(zero);
     let ng = triangle.ng.or_else(front, -triangle.ng);
-    let p = triangle.point(b[0], b[1]);
     let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
     let mut color = V3::splat([1.0; 3]);
     let (mut origin, mut lifted) = (p, none);
     if tables.triangles.has_attributes() {
         let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
         if has.any() {
-            let a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
+            let mut a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
             uvs = a.uvs.masked(has);
             if tables.triangles.has_colors() {
                 color = a.color.or_else(has, color);
             }
             if tables.triangles.has_normals() {
+                if let Some(placed) = &placed {
+                    // At the corners, as when a mesh is merged: normals of one length are interpolated.
+                    let [n0, n1, n2] = a.corner_normals;
+                    a.corner_normals = [placed.normal(n0), placed.normal(n1), placed.normal(n2)];
+                    let [n0, n1, n2] = a.corner_normals;
+                    a.normal = interpolate3(n0, n1, n2, b[0], b[1]).or_else(placed.lanes, a.normal);
+                }
                 let smooth = a.normal.normalized();
                 has_normal = has & a.has_normal & smooth.is_finite();
                 normal = smooth.or_else(has_normal, normal);
@@ -72,7 +96,7 @@ pub(super) fn interact<L: Lanes>(
             }
         }
     }
-    Interaction { triangle, p, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
+    Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
 }
 
 impl<L: Lanes> Interaction<L> {
@@ -85,13 +109,13 @@ impl<L: Lanes> Interaction<L> {
     /// Where rays leave: off the surface on the viewer's side, since all there is is reflection.
     #[inline(always)]
     pub fn start(&self) -> V3<L> {
-        robust::offset_point(self.origin, self.ng, self.triangle.offset_length())
+        robust::offset_point(self.origin, self.ng, self.offset)
     }
 
     /// Just behind the surface, where a ray that passes it goes on.
     #[inline(always)]
     pub fn behind(&self) -> V3<L> {
-        robust::offset_point(self.p, -self.ng, self.triangle.offset_length())
+        robust::offset_point(self.p, -self.ng, self.offset)
     }
 
     /// Whether `wi` leads away from the surface on the viewer's side: from the triangle, or, at a raised origin, from

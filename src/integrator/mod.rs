@@ -19,6 +19,7 @@ use crate::accel::Accel;
 use crate::camera::{CameraRays, PixelFilter};
 use crate::light::table::LightTable;
 use crate::material::table::MaterialTable;
+use crate::shape::placement::PlacementTable;
 use crate::shape::table::TriangleTable;
 use crate::texture::lookup::TextureTable;
 use simd::Level;
@@ -27,6 +28,8 @@ use simd::Level;
 pub struct SceneTables {
     /// Triangles with their attributes.
     pub triangles: TriangleTable,
+    /// Where those of placed meshes are; empty where nothing is placed.
+    pub placements: PlacementTable,
     /// Surface parameters.
     pub materials: MaterialTable,
     /// Texels.

@@ -40,7 +40,7 @@ fn map_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L>
     let zero = L::F::zero();
     let (m, has) = tables.materials.normal_map::<L>(&tables.textures, si.triangle.material, &si.uvs, mapped);
     let flat = m.x.eq(zero) & m.y.eq(zero) & m.z.gt(zero);
-    let (tangent, handedness) = tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1]);
+    let (tangent, handedness) = tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1], &si.placed);
     // glTF 3.7.2.1: bitangent = cross(normal, tangent) x handedness. The tangent is used as interpolated, made unit.
     let across = tangent - normal.scale(normal.dot(tangent));
     let usable = across.dot(across).gt(tangent.dot(tangent) * L::F::splat(MIN_TANGENT_SINE2));

@@ -17,5 +17,6 @@ pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)>
         ("alpha", tables.materials.has_alpha()),
         ("unlit", tables.materials.has_unlit()),
         ("vertex_colors", tables.triangles.has_colors()),
+        ("instances", !tables.placements.is_empty()),
     ]
 }

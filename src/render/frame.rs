@@ -2,7 +2,7 @@
 
 use super::features::features;
 use super::prepare::prepare;
-use super::{Frame, FrameCamera, Phase, Progress, RenderSettings, RenderStats, schedule, tracer};
+use super::{Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, schedule, tracer};
 use crate::error::RenderError;
 use crate::film::{Film, Tile};
 use crate::scene::Scene;
@@ -46,8 +46,6 @@ fn render_here(
     settings: &RenderSettings,
     progress: &Progress,
 ) -> Result<Frame, RenderError> {
-    let (width, height) = (settings.width, settings.height);
-    assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
     progress.enter(Phase::Building);
     let start = Instant::now();
     let prepared = prepare(scene, settings)?;
@@ -55,7 +53,28 @@ fn render_here(
     if progress.is_cancelled() {
         return Err(RenderError::Interrupted);
     }
+    let mut frame = render_prepared(scene, prepared, camera, settings, progress)?;
+    frame.stats.build_seconds = build_seconds;
+    Ok(frame)
+}
 
+/// Renders a scene that was made ready with the same settings, on the current rayon pool; `build_seconds` of its
+/// statistics are 0.
+///
+/// # Errors
+/// `progress` was cancelled.
+///
+/// # Panics
+/// As [`render`].
+pub fn render_prepared(
+    scene: &Scene,
+    prepared: Prepared,
+    camera: usize,
+    settings: &RenderSettings,
+    progress: &Progress,
+) -> Result<Frame, RenderError> {
+    let (width, height) = (settings.width, settings.height);
+    assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
     let camera = tracer::camera(scene, camera, &prepared, settings);
     let window = tracer::window(settings);
     let film = Film::new(Tile { x: window.x, y: window.y, width: window.width, height: window.height }, settings.spp);
@@ -84,7 +103,7 @@ fn render_here(
     }
     let tables = &prepared.tables;
     let stats = RenderStats {
-        build_seconds,
+        build_seconds: 0.0,
         render_seconds,
         camera_rays: totals.counters.camera,
         bounce_rays: totals.counters.bounce,
@@ -92,8 +111,9 @@ fn render_here(
         non_finite_samples: totals.non_finite,
         non_finite_examples: totals.examples,
         truncated: totals.counters.truncated as f64 / paths as f64,
-        triangles: tables.triangles.len() as u64,
+        triangles: prepared.placed.triangles,
         instances: scene.instances.len() as u64,
+        placed_instances: prepared.placed.instances,
         lights: tables.lights.len() as u64,
         features,
         default_light: prepared.default_light,

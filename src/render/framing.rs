@@ -1,9 +1,9 @@
 //! A camera for a scene without one: where it stands so that the whole scene is in the picture and can be recognised.
 //! The policy is stated in docs/conventions.md, "Framing".
 
-use super::prepare::cofactor;
 use crate::camera::{Camera, Projection};
 use crate::scene::{Instance, Scene};
+use crate::shape::placement::cofactor;
 use glam::{DMat3, DMat4, DVec3};
 
 /// Vertical field of view, degrees.

@@ -1,5 +1,6 @@
 //! From a scene and settings to a [`Frame`].
 
+mod boxes;
 mod default_light;
 mod emission;
 mod features;
@@ -8,6 +9,7 @@ mod framing;
 pub mod memory;
 mod opacity;
 mod pilot;
+mod placing;
 mod prepare;
 mod progress;
 mod schedule;
@@ -16,10 +18,11 @@ mod tracer;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use features::features;
-pub use frame::{pool, render};
+pub use frame::{pool, render, render_prepared};
 pub use framing::FRAMING_YFOV;
 pub use pilot::{Pilot, pilot};
-pub use prepare::{Prepared, prepare};
+pub use placing::{Choice, Considered};
+pub use prepare::{PlacedReport, Prepared, prepare, prepare_with};
 pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
 pub use tracer::{camera, window};
@@ -71,10 +74,12 @@ pub struct RenderStats {
     pub non_finite_examples: Vec<(u32, u32, u32)>,
     /// Share of paths ended by the bounce limit that is a safety cap (not by `--max-bounces`).
     pub truncated: f64,
-    /// Triangles after flattening.
+    /// Triangles that rays can meet, with every instance.
     pub triangles: u64,
-    /// Placed meshes.
+    /// Meshes that the file places.
     pub instances: u64,
+    /// Placements of what was not merged into the world; meshes with the same places count once.
+    pub placed_instances: u64,
     /// Lights: punctual ones, emissive triangles and the environment.
     pub lights: u64,
     /// Named yes/no facts about the scene, as in `features` of the JSON.

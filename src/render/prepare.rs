@@ -1,12 +1,14 @@
 //! The seam: a scene's description becomes machinery. Everything conditional is decided here, once.
 
+use super::boxes::{Boxes, is_usable};
 use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::emission::mean_emissions;
 use super::opacity::Opacities;
+use super::placing::{Choice, Considered, Placing, Thing, rounded};
 use super::{AccelChoice, AccelReport, RenderSettings};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
-use crate::accel::geometry::{Geometry, HitFilter, Object, Part};
+use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables};
@@ -15,11 +17,12 @@ use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::table::MaterialTable;
 use crate::math::MAX_UV_SETS;
-use crate::scene::{Instance, MAX_COORDINATE, Scene};
+use crate::scene::Scene;
 use crate::shape::Mesh;
+use crate::shape::placement::{PlacementTable, cofactor, scaled};
 use crate::shape::table::{Corners, NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use std::sync::Arc;
 
 /// A scene made ready to be traced.
@@ -37,10 +40,25 @@ pub struct Prepared {
     pub bounds: Option<(DVec3, DVec3)>,
     /// Whether the built-in studio lights the scene, and why.
     pub default_light: DefaultLightReport,
+    /// What was placed and what merged.
+    pub placed: PlacedReport,
     /// Said to the user.
     pub warnings: Vec<String>,
     /// Those of `warnings` that mean that something of the scene is not in the picture.
     pub losses: Vec<String>,
+}
+
+/// What was placed and what merged.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlacedReport {
+    /// Instances that are placed; the others are merged into the world. Meshes that have the same places count once.
+    pub instances: u64,
+    /// Triangles that rays can meet, those of a placed mesh at each of its places.
+    pub triangles: u64,
+    /// Triangles held, those of a placed mesh once.
+    pub stored: u64,
+    /// What has several instances, and what became of it.
+    pub considered: Vec<Considered>,
 }
 
 /// What is counted while instances are flattened.
@@ -59,7 +77,7 @@ struct Totals {
 /// the range of f32. Paths still find what they emit.
 const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
 
-/// The world's triangles: those that stop every ray, and those whose hits are to be asked about.
+/// Triangles of the world or of an object: those that stop every ray, and those whose hits are to be asked about.
 struct Parts {
     opaque: Part,
     filtered: Part,
@@ -78,12 +96,10 @@ impl Parts {
     }
 
     /// What backends are built from.
-    fn geometry(self, tables: &Arc<SceneTables>) -> Geometry {
+    fn object(self) -> Object {
         let mut parts = vec![self.opaque, self.filtered];
         parts.retain(|part| !part.triangles.indices.is_empty());
-        let is_filtered = parts.iter().any(|part| part.filtered);
-        let filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(tables))) as Arc<dyn HitFilter>);
-        Geometry { world: Object { parts, shapes: Vec::new() }, filter, ..Geometry::default() }
+        Object { parts, shapes: Vec::new() }
     }
 }
 
@@ -92,23 +108,59 @@ impl Parts {
 /// # Errors
 /// The backend is not to be had, or the scene does not fit index types.
 pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, RenderError> {
-    let count = scene.triangle_count();
-    // Records are gathered by signed 32-bit indices, four a triangle.
-    if count > (i32::MAX / 4) as usize {
+    prepare_with(scene, settings, Choice::Auto)
+}
+
+/// Prepares `scene` with meshes placed or merged as `choice` says.
+///
+/// # Errors
+/// As of [`prepare`].
+pub fn prepare_with(scene: &Scene, settings: &RenderSettings, choice: Choice) -> Result<Prepared, RenderError> {
+    let boxes = Boxes::of(scene);
+    let placing = Placing::of(scene, &boxes, choice);
+    let count = stored_triangles(scene, &placing);
+    // Records are gathered by signed 32-bit indices, four a triangle and seven a placement.
+    if count > (i32::MAX / 4) as u64 {
         return Err(RenderError::TooLarge(format!("{count} triangles; at most {}", i32::MAX / 4)));
     }
-    let bounds = bounds(scene);
-    let origin = bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    if placing.placements() > (i32::MAX / 7) as usize {
+        return Err(RenderError::TooLarge(format!("{} instances; at most {}", placing.placements(), i32::MAX / 7)));
+    }
+    let (bounds, origin) = (boxes.scene, boxes.origin());
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
     let materials = MaterialTable::new(&scene.materials, &mut textures);
-    let mut triangles = TriangleTable::with_capacity(count);
+    let mut triangles = TriangleTable::with_capacity(count as usize);
     let mut parts = Parts::default();
     let mut lights = Vec::new();
     let (emissions, opacities) = (mean_emissions(scene), Opacities::new(scene));
     let mut totals = Totals::default();
-    for instance in &scene.instances {
-        flatten(scene, instance, origin, &emissions, &opacities, &mut parts, &mut triangles, &mut lights, &mut totals);
+    for instance in scene.instances.iter().zip(&placing.is_merged).filter_map(|(i, merged)| merged.then_some(i)) {
+        let mesh = &scene.meshes[instance.mesh.index()];
+        let map = &instance.world_from_object;
+        let lights = Some(&mut lights);
+        flatten(scene, mesh, map, origin, &emissions, &opacities, &mut parts, &mut triangles, lights, &mut totals);
     }
+    let mut geometry = Geometry { world: parts.object(), ..Geometry::default() };
+    let mut placements = PlacementTable::with_capacity(placing.placements());
+    let mut seen = triangles.len() as u64;
+    for thing in &placing.things {
+        let before = triangles.len();
+        geometry.objects.push(object(scene, thing, &emissions, &opacities, &mut triangles, &mut totals));
+        seen += (triangles.len() - before) as u64 * thing.instances.len() as u64;
+        let object = (geometry.objects.len() - 1) as u32;
+        for map in thing.places(scene, origin) {
+            let map = rounded(&map);
+            placements.push(map.columns, map.translation);
+            geometry.placements.push(Placement { object, keys: vec![map] });
+        }
+        add_surface(scene, thing, &emissions, &mut totals.surface);
+    }
+    let placed = PlacedReport {
+        instances: placing.placements() as u64,
+        triangles: seen,
+        stored: triangles.len() as u64,
+        considered: placing.considered,
+    };
     let (mut warnings, mut losses) = (Vec::new(), Vec::new());
     if totals.without_area > 0 {
         warnings.push(format!("{} triangles have no area once placed and were dropped", totals.without_area));
@@ -133,9 +185,65 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
         warnings.push(default_light.darkness(scene));
     }
     let lights = LightTable::new(&lights, environment, &mut triangles);
-    let tables = Arc::new(SceneTables { triangles, materials, textures, lights });
-    let (accel, accel_report) = build_accel(parts.geometry(&tables), settings)?;
-    Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings, losses })
+    let tables = Arc::new(SceneTables { triangles, placements, materials, textures, lights });
+    let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
+    geometry.filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(&tables))) as Arc<dyn HitFilter>);
+    let (accel, accel_report) = build_accel(geometry, settings)?;
+    Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, placed, warnings, losses })
+}
+
+/// Triangles that are held: those of merged instances, and of each placed mesh once.
+pub(super) fn stored_triangles(scene: &Scene, placing: &Placing) -> u64 {
+    let of = |mesh: &Mesh| mesh.indices.len() as u64;
+    let merged = scene.instances.iter().zip(&placing.is_merged).filter(|(_, merged)| **merged);
+    let merged: u64 = merged.map(|(instance, _)| of(&scene.meshes[instance.mesh.index()])).sum();
+    let placed = placing.things.iter().flat_map(|thing| &thing.meshes);
+    merged + placed.map(|mesh| of(&scene.meshes[mesh.index()])).sum::<u64>()
+}
+
+/// What is placed, in a space of its own.
+fn object(
+    scene: &Scene,
+    thing: &Thing,
+    emissions: &[[f64; 3]],
+    opacities: &Opacities,
+    table: &mut TriangleTable,
+    totals: &mut Totals,
+) -> Object {
+    let mut parts = Parts::default();
+    for mesh in &thing.meshes {
+        let mesh = &scene.meshes[mesh.index()];
+        flatten(scene, mesh, &DMat4::IDENTITY, thing.centre, emissions, opacities, &mut parts, table, None, totals);
+    }
+    parts.object()
+}
+
+/// Adds the surface of a placed thing, at all its places, to `surface`.
+fn add_surface(scene: &Scene, thing: &Thing, emissions: &[[f64; 3]], surface: &mut SurfaceTotals) {
+    for mesh in &thing.meshes {
+        let mesh = &scene.meshes[mesh.index()];
+        // Areas go by the cofactor matrix: a triangle of area a and unit normal n has the area a |C n|, whose root mean
+        // square over the mesh takes the sum of a n n^T alone. Exact for uniform scales; else above the mean.
+        let (mut area, mut squares) = (0.0, DMat3::ZERO);
+        for triangle in &mesh.indices {
+            let [a, b, c] = triangle.map(|i| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3());
+            let cross = 0.5 * (b - a).cross(c - a);
+            let size = cross.length();
+            if size > 0.0 {
+                let n = cross / size;
+                area += size;
+                squares += DMat3::from_cols(n * n.x, n * n.y, n * n.z) * size;
+            }
+        }
+        let placed = |map: DMat4| {
+            let c = cofactor(DMat3::from_mat4(map));
+            let sum = c * squares * c.transpose();
+            (area * (sum.x_axis.x + sum.y_axis.y + sum.z_axis.z)).sqrt()
+        };
+        let area = thing.places(scene, DVec3::ZERO).map(placed).sum();
+        let (material, emission) = (scene.materials.get(mesh.material.index()), emissions.get(mesh.material.index()));
+        surface.add(area, material, emission.copied().unwrap_or_default());
+    }
 }
 
 /// Most that the environment takes of the light samples where there are other lights: scattered rays find it by
@@ -159,49 +267,23 @@ fn environment(
     Some((table, weight))
 }
 
-/// World bounds of everything placed.
-fn bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
-    let mut bounds: Option<(DVec3, DVec3)> = None;
-    for instance in &scene.instances {
-        let mesh = &scene.meshes[instance.mesh.index()];
-        // Only vertices that a triangle uses, and only triangles that are kept: one that flies off to 1e30 m would leave
-        // the others no digits.
-        for triangle in &mesh.indices {
-            let place = |i: u32| glam::Vec3::from(mesh.positions[i as usize]).as_dvec3();
-            let corners = triangle.map(|i| instance.world_from_object.transform_point3(place(i)));
-            if !corners.iter().all(is_usable) {
-                continue;
-            }
-            for p in corners {
-                let (low, high) = bounds.get_or_insert((p, p));
-                (*low, *high) = (low.min(p), high.max(p));
-            }
-        }
-    }
-    bounds
-}
-
-/// Whether every backend takes a triangle with the corner `p`; placing it may have moved it out of range.
-fn is_usable(p: &DVec3) -> bool {
-    p.to_array().iter().all(|c| c.abs() <= f64::from(MAX_COORDINATE))
-}
-
-/// Appends one instance in world space, recentred, vertices transformed in f64 and rounded once.
+/// Appends a mesh where `world_from_object` puts it, seen from `origin`; vertices are transformed in f64 and rounded
+/// once. Without `lights` it is an object's own: it gives no light and does not count as surface.
 #[expect(clippy::too_many_arguments, reason = "what is read, then the four tables that grow")]
 fn flatten(
     scene: &Scene,
-    instance: &Instance,
+    mesh: &Mesh,
+    world_from_object: &DMat4,
     origin: DVec3,
     emissions: &[[f64; 3]],
     opacities: &Opacities,
     parts: &mut Parts,
     table: &mut TriangleTable,
-    lights: &mut Vec<(PreparedLight, f64)>,
+    mut lights: Option<&mut Vec<(PreparedLight, f64)>>,
     totals: &mut Totals,
 ) {
-    let mesh = &scene.meshes[instance.mesh.index()];
     let material = scene.materials.get(mesh.material.index());
-    let linear = scaled(DMat3::from_mat4(instance.world_from_object));
+    let linear = scaled(DMat3::from_mat4(*world_from_object));
     // Normals go by the cofactor matrix: no division, so nearly singular transforms stay finite. A mirroring transform
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
@@ -210,7 +292,7 @@ fn flatten(
     let triangles = &mut part.triangles;
     let first = triangles.positions.len() as u32;
     triangles.positions.extend(mesh.positions.iter().map(|&p| {
-        let p = instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
+        let p = world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
         (p - origin).as_vec3().to_array()
     }));
     // Once a vertex, not once a corner: a vertex is in six triangles on average.
@@ -264,13 +346,18 @@ fn flatten(
         part.primitives.push(triangles.indices.len(), primitive);
         triangles.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
-        if average > 0.0 && area > LEAST_SAMPLED_AREA {
+        if average > 0.0
+            && area > LEAST_SAMPLED_AREA
+            && let Some(lights) = &mut lights
+        {
             let power = average * area * sides * std::f64::consts::PI;
             let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
             lights.push((light, power));
         }
     }
-    totals.surface.add(mesh_area, material, emission);
+    if lights.is_some() {
+        totals.surface.add(mesh_area, material, emission);
+    }
 }
 
 /// Attributes of a triangle's corners.
@@ -282,17 +369,6 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
     }
     let colors = mesh.colors.as_ref().map(|c| corners.map(|v| c[v as usize]));
     table.push_attributes(&Corners { normals, uvs: &uvs[..sets], colors })
-}
-
-/// `m` over its largest element: directions stay, and products of three elements stay in range whatever the scale.
-fn scaled(m: DMat3) -> DMat3 {
-    let largest = m.to_cols_array().iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    if largest == 0.0 { m } else { DMat3::from_cols_array(&m.to_cols_array().map(|x| x / largest)) }
-}
-
-/// Matrix of cofactors: the inverse transpose times the determinant.
-pub(super) fn cofactor(m: DMat3) -> DMat3 {
-    DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
 /// Adds the punctual lights that shine at all.

@@ -1,5 +1,6 @@
 //! Shapes: for now triangle meshes.
 
+pub mod placement;
 pub mod table;
 
 use crate::id::MaterialId;

@@ -1,5 +1,7 @@
-//! Triangles as shading reads them: four 16-byte records, one cache line, a triangle.
+//! Triangles as shading reads them: four 16-byte records, one cache line, a triangle. Those of placed meshes are there
+//! once, in their object's space; `placement.rs` carries what is read to the prepared space.
 
+use super::placement::Placed;
 use crate::math::{MAX_UV_SETS, UvSets, V3, robust};
 use simd::{Float, Lanes, Mask, Uint};
 
@@ -252,17 +254,23 @@ impl TriangleTable {
         }
     }
 
-    /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`); the table must have some.
+    /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`), of a triangle that is `placed`; the
+    /// table must have some.
     #[inline(always)]
-    pub fn tangent<L: Lanes>(&self, index: L::U, u: L::F, v: L::F) -> (V3<L>, L::F) {
+    pub fn tangent<L: Lanes>(&self, index: L::U, u: L::F, v: L::F, placed: &Option<Placed<L>>) -> (V3<L>, L::F) {
         let at = index + index + index;
         let one = L::U::splat(1);
         let t0 = at.records(&self.tangents);
         let t1 = (at + one).records(&self.tangents);
         let t2 = (at + one + one).records(&self.tangents);
-        let (a, b, c) =
+        let (mut a, mut b, mut c) =
             (V3::<L>::new(t0[0], t0[1], t0[2]), V3::<L>::new(t1[0], t1[1], t1[2]), V3::<L>::new(t2[0], t2[1], t2[2]));
-        ((c - a).mul_add(v, (b - a).mul_add(u, a)), t0[3])
+        let mut handedness = t0[3];
+        if let Some(placed) = placed {
+            (a, b, c) = (placed.direction(a), placed.direction(b), placed.direction(c));
+            handedness = placed.handedness(handedness);
+        }
+        (interpolate3(a, b, c, u, v), handedness)
     }
 }
 
@@ -272,8 +280,9 @@ fn interpolate<L: Lanes>(a0: L::F, a1: L::F, a2: L::F, b1: L::F, b2: L::F) -> L:
     (a2 - a0).mul_add(b2, (a1 - a0).mul_add(b1, a0))
 }
 
+/// The same for vectors.
 #[inline(always)]
-fn interpolate3<L: Lanes>(a0: V3<L>, a1: V3<L>, a2: V3<L>, b1: L::F, b2: L::F) -> V3<L> {
+pub fn interpolate3<L: Lanes>(a0: V3<L>, a1: V3<L>, a2: V3<L>, b1: L::F, b2: L::F) -> V3<L> {
     (a2 - a0).mul_add(b2, (a1 - a0).mul_add(b1, a0))
 }
 
@@ -284,10 +293,31 @@ impl<L: Lanes> Triangle<L> {
         self.e2.mul_add(v, self.e1.mul_add(u, self.v0))
     }
 
-    /// How far a ray's origin is moved off the surface, metres: the bound of [`robust::offset_length`].
+    /// How far a ray's origin is moved off the surface, metres: the bound of [`robust::offset_length`]. For a triangle of
+    /// the world.
     #[inline(always)]
     pub fn offset_length(&self) -> L::F {
-        let max_abs = self.v0.abs().max((self.v0 + self.e1).abs()).max((self.v0 + self.e2).abs());
-        robust::offset_length(max_abs, self.ng)
+        robust::offset_length(self.max_abs(), self.ng)
+    }
+
+    /// The largest coordinates, by axis.
+    #[inline(always)]
+    fn max_abs(&self) -> V3<L> {
+        self.v0.abs().max((self.v0 + self.e1).abs()).max((self.v0 + self.e2).abs())
+    }
+
+    /// The triangle where it is `placed`, the point `p` of it there, and how far a ray's origin is moved off it, metres.
+    #[inline(always)]
+    pub fn placed(&self, placed: &Option<Placed<L>>, p: V3<L>) -> (Self, V3<L>, L::F) {
+        let Some(placed) = placed else { return (*self, p, self.offset_length()) };
+        let triangle = Self {
+            v0: placed.point(self.v0),
+            e1: placed.vector(self.e1),
+            e2: placed.vector(self.e2),
+            ng: placed.normal(self.ng),
+            ..*self
+        };
+        let offset = placed.offset_length(self.max_abs().max_component(), triangle.ng);
+        (triangle, placed.point(p), offset.or_else(placed.lanes, self.offset_length()))
     }
 }

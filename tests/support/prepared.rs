@@ -4,10 +4,11 @@
 use glam::{DMat4, DVec3};
 use prt::accel::{HitBatch, MISS, RayBatch};
 use prt::material::Material;
-use prt::render::{AccelChoice, Prepared, RenderSettings, prepare};
+use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_with};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
-use simd::{Float, Kernel, Lanes, Level, Uint};
+use prt::shape::table::interpolate3;
+use simd::{Float, Kernel, Lanes, Level, Mask, Uint};
 
 /// A mesh of positions and triangles alone.
 pub fn mesh(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Mesh {
@@ -44,15 +45,34 @@ pub fn one_instance(mesh: &Mesh, place: DMat4) -> Scene {
     scene(mesh, &[place])
 }
 
-/// Made ready with our own BVH.
+/// Made ready with our own BVH, everything merged into the world.
 pub fn prepared(scene: &Scene) -> Prepared {
-    let settings = RenderSettings { accel: AccelChoice::Bvh, ..RenderSettings::default() };
-    prepare(scene, &settings).expect("a small scene")
+    prepared_as(scene, AccelChoice::Bvh, Choice::Never)
+}
+
+/// Made ready with a backend, meshes placed or merged as `choice` says.
+pub fn prepared_as(scene: &Scene, accel: AccelChoice, choice: Choice) -> Prepared {
+    let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
+    let settings = RenderSettings { accel, embree_dirs: vec![folder], ..RenderSettings::default() };
+    prepare_with(scene, &settings, choice).expect("a small scene")
+}
+
+/// The backends that have placements and run here; `bvh` joins when it has them.
+pub fn backends() -> Vec<AccelChoice> {
+    let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
+    let mut all = vec![AccelChoice::Linear];
+    match prt::accel::embree::find(&[folder]) {
+        Ok(_) => all.push(AccelChoice::Embree),
+        Err(why) => println!("skipped: no Embree library ({why})"),
+    }
+    all
 }
 
 /// A point of a triangle; vectors in the prepared space.
 #[derive(Clone, Debug)]
 pub struct Seen {
+    /// 0 for the world, i + 1 for placement i.
+    pub instance: u32,
     pub primitive: u32,
     /// Barycentric weight of the second corner.
     pub u: f32,
@@ -65,46 +85,76 @@ pub struct Seen {
     pub ns: DVec3,
     /// Length of the offset of rays that leave, metres.
     pub offset: f64,
+    /// Bound of the point's error along each axis, metres.
+    pub bound: DVec3,
     /// Selection pmf over area, 1/m^2.
     pub light_density: f64,
 }
 
-/// The points (triangle, u, v), read as shading reads them.
+/// The points (triangle of the world, u, v), read as shading reads them.
 pub fn read(prepared: &Prepared, points: &[(u32, f32, f32)]) -> Vec<Seen> {
-    struct Read<'a>(&'a Prepared, &'a [(u32, f32, f32)]);
+    let points: Vec<_> = points.iter().map(|&(primitive, u, v)| (0, primitive, u, v)).collect();
+    read_placed(prepared, &points)
+}
+
+/// The points (instance, triangle, u, v), read as shading reads them.
+pub fn read_placed(prepared: &Prepared, points: &[(u32, u32, f32, f32)]) -> Vec<Seen> {
+    struct Read<'a>(&'a Prepared, &'a [(u32, u32, f32, f32)]);
     impl Kernel for Read<'_> {
         type Output = Vec<Seen>;
 
         #[inline(always)]
         fn run<L: Lanes>(self) -> Vec<Seen> {
-            let table = &self.0.tables.triangles;
+            let tables = &self.0.tables;
             let get = |x: L::F| {
                 let mut out = [0.0; 16];
                 x.store(&mut out, 0);
                 f64::from(out[0])
             };
             let vector = |v: prt::math::V3<L>| DVec3::new(get(v.x), get(v.y), get(v.z));
-            self.1
-                .iter()
-                .map(|&(primitive, u, v)| {
-                    let triangle = table.get::<L>(L::U::splat(primitive));
-                    let at = (u, v);
-                    let (u, v) = (L::F::splat(u), L::F::splat(v));
-                    let ng = vector(triangle.ng);
+            let one = |&(instance, primitive, u, v): &(u32, u32, f32, f32)| {
+                let stored = tables.triangles.get::<L>(L::U::splat(primitive));
+                let at = (u, v);
+                let (u, v) = (L::F::splat(u), L::F::splat(v));
+                let all = L::M::first(L::N);
+                let placed = match tables.placements.is_empty() {
+                    true => None,
+                    false => tables.placements.get::<L>(L::U::splat(instance), all),
+                };
+                let (triangle, p, offset) = stored.placed(&placed, stored.point(u, v));
+                let ng = vector(triangle.ng);
+                let normal = tables.triangles.has_attributes().then(|| {
+                    let a = tables.triangles.attributes::<L>(triangle.attributes, u, v);
+                    let [n0, n1, n2] = a.corner_normals;
                     let normal =
-                        table.has_attributes().then(|| vector(table.attributes::<L>(triangle.attributes, u, v).normal));
-                    Seen {
-                        primitive,
-                        u: at.0,
-                        v: at.1,
-                        point: vector(triangle.point(u, v)),
-                        ng,
-                        ns: normal.map_or(ng, DVec3::normalize_or_zero),
-                        offset: get(triangle.offset_length()),
-                        light_density: get(triangle.light_density),
-                    }
-                })
-                .collect()
+                        placed.map_or(a.normal, |by| interpolate3(by.normal(n0), by.normal(n1), by.normal(n2), u, v));
+                    vector(normal)
+                });
+                let corner = |edge: prt::math::V3<L>| vector(stored.v0 + edge).abs();
+                let zero = prt::math::V3::zero();
+                let extent = corner(zero).max(corner(stored.e1)).max(corner(stored.e2)).max_element();
+                let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+                let bound =
+                    match &placed {
+                        Some(placed) => DVec3::from_array(axes.map(|axis| {
+                            get(placed.offset_length(L::F::splat(extent as f32), prt::math::V3::splat(axis)))
+                        })),
+                        None => DVec3::splat(get(offset)),
+                    };
+                Seen {
+                    instance,
+                    primitive,
+                    u: at.0,
+                    v: at.1,
+                    point: vector(p),
+                    ng,
+                    ns: normal.map_or(ng, DVec3::normalize_or_zero),
+                    offset: get(offset),
+                    bound,
+                    light_density: get(triangle.light_density),
+                }
+            };
+            self.1.iter().map(one).collect()
         }
     }
     simd::dispatch(Level::Scalar, Read(prepared, points))
@@ -119,9 +169,9 @@ pub fn trace(prepared: &Prepared, rays: &[(DVec3, DVec3)]) -> Vec<Option<Seen>> 
     let mut hits = HitBatch::new(rays.len());
     prepared.accel.intersect(&batch, 0..rays.len(), false, &mut hits);
     let hit: Vec<usize> = (0..rays.len()).filter(|&i| hits.primitive[i] != MISS).collect();
-    let points: Vec<_> = hit.iter().map(|&i| (hits.primitive[i], hits.u[i], hits.v[i])).collect();
+    let points: Vec<_> = hit.iter().map(|&i| (hits.instance[i], hits.primitive[i], hits.u[i], hits.v[i])).collect();
     let mut seen = vec![None; rays.len()];
-    for (i, point) in hit.into_iter().zip(read(prepared, &points)) {
+    for (i, point) in hit.into_iter().zip(read_placed(prepared, &points)) {
         seen[i] = Some(point);
     }
     seen

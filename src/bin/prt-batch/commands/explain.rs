@@ -4,6 +4,7 @@ use crate::term;
 use prt::batch::explain::{CameraPlan, Explanation, MemoryPlan, Prospect, explain};
 use prt::batch::memory::amount;
 use prt::batch::{BatchSettings, Stop, report};
+use prt::render::Considered;
 use serde::Serialize;
 use std::process::ExitCode;
 
@@ -96,8 +97,11 @@ fn text(plan: &Explanation) -> String {
     }
     if let Some(triangles) = &plan.triangles {
         let (placed, traced) = (grouped(triangles.placed), grouped(triangles.traced));
-        let dropped =
+        let mut dropped =
             if triangles.traced == triangles.placed { String::new() } else { format!(", {traced} of them traced") };
+        if triangles.stored != triangles.traced {
+            dropped += &format!(", {} held", grouped(triangles.stored));
+        }
         let count = |n: Option<usize>| grouped(n.unwrap_or(0) as u64);
         let (meshes, instances, materials) = (count(plan.meshes), count(plan.instances), count(plan.materials));
         lines.add(
@@ -108,6 +112,7 @@ fn text(plan: &Explanation) -> String {
             ),
         );
     }
+    lines.list("instances", plan.placing.iter().map(placing_text));
     if !plan.textures.is_empty() {
         lines.add("textures", format!("{}, {}", plan.textures.len(), amount(plan.texture_bytes)));
         lines.list(
@@ -149,6 +154,19 @@ fn camera_text(camera: &CameraPlan) -> String {
     let yfov = camera.yfov.map_or_else(String::new, |yfov| format!(", yfov {yfov:.1} deg"));
     let [x, y, z] = camera.eye;
     format!("{which}{from}: {}{yfov}, at {x:.3},{y:.3},{z:.3}", camera.projection)
+}
+
+/// What became of something that has several instances.
+fn placing_text(thing: &Considered) -> String {
+    let more = if thing.meshes > 1 { format!(" ({} meshes)", thing.meshes) } else { String::new() };
+    let became = match thing.placed {
+        0 => String::from("merged"),
+        n if n == thing.instances => String::from("placed"),
+        n => format!("{} placed, the others merged, since placing them would cost precision", grouped(n)),
+    };
+    let (n, instances, why) = (grouped(thing.triangles), grouped(thing.instances), thing.why);
+    let (merge, place) = (seconds(thing.merge_seconds), seconds(thing.place_seconds));
+    format!("{}{more}, {n} triangles x {instances}: {became} ({why}; merging {merge}, placing {place})", thing.mesh)
 }
 
 fn light_lines(plan: &Explanation, lines: &mut Lines) {
