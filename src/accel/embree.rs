@@ -6,17 +6,20 @@ use super::geometry::{Geometry, Part, Primitives};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use crate::error::RenderError;
 use embree4_rs::{
-    BuildQuality, CommittedScene, Device, HitsSoAMut, Library, RaysSoA, Scene, SceneFlags, TriangleGeometry,
+    BuildQuality, CommittedScene, Device, Hit, HitsSoAMut, Library, Ray, RaysSoA, Scene, SceneFlags, TriangleGeometry,
 };
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// A committed Embree scene of one geometry a part.
+#[derive(Clone)]
 pub struct EmbreeAccel {
-    scene: CommittedScene,
+    scene: Arc<CommittedScene>,
     /// Of each geometry.
-    primitives: Vec<Primitives>,
+    primitives: Arc<[Primitives]>,
+    /// Whether every ray is a call of its own in place of packets.
+    single: bool,
 }
 
 /// The library that [`EmbreeAccel::build`] uses: `EMBREE_DIR`, `folders`, then the system's.
@@ -54,8 +57,34 @@ impl EmbreeAccel {
             scene.attach(TriangleGeometry::new(&device, triangles.positions, triangles.indices)?)?;
             primitives.push(numbers);
         }
-        Ok(Self { scene: scene.commit()?, primitives })
+        Ok(Self { scene: Arc::new(scene.commit()?), primitives: primitives.into(), single: false })
     }
+
+    /// The same scene asked ray by ray: for measurements, since scattered rays may be faster so.
+    pub fn in_single_rays(&self) -> Self {
+        Self { single: true, ..self.clone() }
+    }
+
+    /// Rays in a packet: 8 or 16.
+    pub fn packet_width(&self) -> usize {
+        self.scene.device().native_width().max(8)
+    }
+
+    /// Nearest hits ray by ray; `instance` receives the geometry, as from packets.
+    fn intersect_single(&self, rays: &RayBatch, range: Range<usize>, hits: &mut HitBatch) {
+        for i in range {
+            let hit = self.scene.intersect1(&ray(rays, i));
+            let none = Hit { t: rays.t_max[i], u: 0.0, v: 0.0, ng: [0.0; 3], primitive: MISS, geometry: MISS, instance: MISS };
+            let hit = hit.unwrap_or(none);
+            (hits.t[i], hits.u[i], hits.v[i]) = (hit.t, hit.u, hit.v);
+            (hits.primitive[i], hits.instance[i]) = (hit.primitive, hit.geometry);
+        }
+    }
+}
+
+fn ray(rays: &RayBatch, i: usize) -> Ray {
+    let origin = [rays.ox[i], rays.oy[i], rays.oz[i]];
+    Ray { t_max: rays.t_max[i], ..Ray::new(origin, [rays.dx[i], rays.dy[i], rays.dz[i]]) }
 }
 
 fn slices(rays: &RayBatch, range: Range<usize>) -> RaysSoA<'_> {
@@ -73,15 +102,19 @@ fn slices(rays: &RayBatch, range: Range<usize>) -> RaysSoA<'_> {
 
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-        let into = HitsSoAMut {
-            t: &mut hits.t[range.clone()],
-            u: &mut hits.u[range.clone()],
-            v: &mut hits.v[range.clone()],
-            primitive: &mut hits.primitive[range.clone()],
-            geometry: &mut hits.instance[range.clone()],
-            instance: None,
-        };
-        self.scene.intersect_batch(slices(rays, range.clone()), coherent, into);
+        if self.single {
+            self.intersect_single(rays, range.clone(), hits);
+        } else {
+            let into = HitsSoAMut {
+                t: &mut hits.t[range.clone()],
+                u: &mut hits.u[range.clone()],
+                v: &mut hits.v[range.clone()],
+                primitive: &mut hits.primitive[range.clone()],
+                geometry: &mut hits.instance[range.clone()],
+                instance: None,
+            };
+            self.scene.intersect_batch(slices(rays, range.clone()), coherent, into);
+        }
         // Embree numbers the triangles of each geometry from 0.
         if let [Primitives::From(0)] = self.primitives[..] {
             return;
@@ -96,6 +129,10 @@ impl Accel for EmbreeAccel {
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
+        if self.single {
+            occluded[..n].iter_mut().enumerate().for_each(|(i, o)| *o = self.scene.occluded1(&ray(rays, i)).into());
+            return;
+        }
         self.scene.occluded_batch(slices(rays, 0..n), false, &mut occluded[..n]);
     }
 

@@ -12,6 +12,7 @@ mod shade;
 mod terminator;
 mod wave;
 
+pub use pool::POOL;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;
