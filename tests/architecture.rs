@@ -41,7 +41,7 @@ const MAY_USE: [(&str, &[&str]); 19] = [
             "texture",
         ],
     ),
-    ("bench", &["accel", "camera", "error", "film", "integrator", "math", "render", "sampler", "scene"]),
+    ("bench", &["accel", "camera", "error", "film", "integrator", "load", "math", "render", "sampler", "scene"]),
 ];
 
 /// Sits on top: may use everything but the binary.

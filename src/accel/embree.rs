@@ -74,7 +74,8 @@ impl EmbreeAccel {
     fn intersect_single(&self, rays: &RayBatch, range: Range<usize>, hits: &mut HitBatch) {
         for i in range {
             let hit = self.scene.intersect1(&ray(rays, i));
-            let none = Hit { t: rays.t_max[i], u: 0.0, v: 0.0, ng: [0.0; 3], primitive: MISS, geometry: MISS, instance: MISS };
+            let none =
+                Hit { t: rays.t_max[i], u: 0.0, v: 0.0, ng: [0.0; 3], primitive: MISS, geometry: MISS, instance: MISS };
             let hit = hit.unwrap_or(none);
             (hits.t[i], hits.u[i], hits.v[i]) = (hit.t, hit.u, hit.v);
             (hits.primitive[i], hits.instance[i]) = (hit.primitive, hit.geometry);

@@ -78,3 +78,47 @@ fn is_equal(rays: &RayBatch, i: usize, a: f32, b: f32) -> bool {
     let extent = origin(rays, i).abs().max_element() + a.max(b) * speed;
     (a - b).abs() * speed <= 2.0 * gamma(16) * extent
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::geometry::{Geometry, Object, Part, Primitives};
+    use crate::accel::{Triangles, linear::Linear};
+    use glam::Vec3;
+
+    /// Two overlapping squares at z = 0 with these numbers for the triangles of the second, and one at `z`.
+    fn squares(first: u32, z: f32) -> Linear {
+        let square = |z: f32, first: u32| Part {
+            triangles: Triangles {
+                positions: vec![[-1.0, -1.0, z], [1.0, -1.0, z], [1.0, 1.0, z], [-1.0, 1.0, z]],
+                indices: vec![[0, 1, 2], [0, 2, 3]],
+            },
+            primitives: Primitives::From(first),
+            ..Part::default()
+        };
+        let parts = vec![square(0.0, 10), square(0.0, first), square(z, 30)];
+        Linear::new(Geometry { world: Object { parts, shapes: Vec::new() }, ..Geometry::default() })
+    }
+
+    #[test]
+    fn ties_are_told_from_wrong_hits() {
+        let mut rays = RayBatch::new(16);
+        for i in 0..4 {
+            rays.set(i, Vec3::new(0.3 * i as f32 + 0.1, 0.05, 9.0), Vec3::NEG_Z, f32::INFINITY);
+        }
+        rays.set(4, Vec3::new(5.0, 0.0, 9.0), Vec3::NEG_Z, f32::INFINITY);
+        let compared = |a: &Linear, b: &Linear| compare_batch(Kind::Diffuse, &rays, 5, a, b);
+        let base = squares(20, -1.0);
+        let all = Agreement { rays: 5, hits: 4, ..Agreement::default() };
+        assert_eq!(compared(&base, &base), all);
+        // The other square's numbers are lower there: the same distance, another triangle.
+        assert_eq!(compared(&base, &squares(0, -1.0)), Agreement { ties: 4, ..all });
+        assert_eq!(compared(&base, &squares(20, 1e-6)), Agreement { ties: 4, ..all });
+        assert_eq!(compared(&base, &squares(20, 1e-3)), Agreement { disagreements: 4, ..all });
+        let nothing = Linear::new(Triangles::default());
+        assert_eq!(compared(&base, &nothing), Agreement { disagreements: 4, ..all });
+        let shadow = compare_batch(Kind::Shadow, &rays, 5, &base, &nothing);
+        assert_eq!(shadow, Agreement { disagreements: 4, ..all });
+        assert_eq!(shadow.per_million(shadow.disagreements), 800_000.0);
+    }
+}

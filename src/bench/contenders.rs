@@ -111,8 +111,11 @@ impl Contenders {
     }
 }
 
+/// Rays a call, where there is a choice, and what takes them so.
+type Entry = (Option<usize>, Box<dyn Accel>);
+
 /// A backend by each of its ways to take rays.
-fn entries(backend: &Backend, geometry: &Geometry) -> Result<Vec<(Option<usize>, Box<dyn Accel>)>, RenderError> {
+fn entries(backend: &Backend, geometry: &Geometry) -> Result<Vec<Entry>, RenderError> {
     Ok(match backend {
         Backend::Embree(library) => {
             let packets = EmbreeAccel::build_with(geometry.clone(), library)?;

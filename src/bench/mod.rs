@@ -28,8 +28,8 @@ use crate::render::{self, AccelChoice, RenderSettings, build_accel, prepare_with
 use crate::scene::Scene;
 use agreement::{Agreement, compare, compare_batch};
 use contenders::{Contender, Contenders, time_builds};
-use rays::{RaySet, ray_sets};
 use rayon::ThreadPool;
+use rays::{RaySet, ray_sets};
 use report::rows;
 use stats::Spread;
 use std::fmt;

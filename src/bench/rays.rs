@@ -322,3 +322,95 @@ impl Kernel for Choose<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::linear::Linear;
+    use crate::load::{LoadOptions, load};
+    use crate::render::{self, AccelChoice, RenderSettings, build_accel, prepare_with};
+    use std::path::Path;
+
+    fn sets(seed: u64) -> (Geometry, Vec<RaySet>) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.gltf");
+        let (scene, _) = load(&path, &LoadOptions::default()).unwrap();
+        let settings = RenderSettings { accel: AccelChoice::Linear, ..RenderSettings::default() };
+        let mut geometry = Geometry::default();
+        let prepared = prepare_with(&scene, &settings, |all| {
+            geometry = all.clone();
+            build_accel(all, &settings)
+        });
+        let prepared = prepared.unwrap();
+        let camera = render::camera(&scene, 0, &prepared, &settings);
+        let sets = ray_sets(&prepared, &geometry, &camera, 3, seed).unwrap();
+        (geometry, sets)
+    }
+
+    #[test]
+    fn rays_of_all_kinds_are_what_they_are_said_to_be() {
+        let (geometry, sets) = sets(1);
+        assert_eq!(sets.iter().map(|set| set.kind).collect::<Vec<_>>(), Kind::ALL);
+        let accel = Linear::new(geometry.clone());
+        let [low, high] = geometry.bounds().unwrap();
+        let mut hits = HitBatch::new(POOL);
+        let mut share = |set: &RaySet| {
+            let mut n = 0;
+            for rays in &set.batches {
+                accel.intersect(rays, 0..POOL, false, &mut hits);
+                n += hits.primitive[..POOL].iter().filter(|&&p| p != crate::accel::MISS).count();
+            }
+            n as f64 / set.len() as f64
+        };
+        for set in &sets {
+            assert_eq!((set.batches.len(), set.len()), (3, 3 * POOL));
+        }
+        let [primary, diffuse, shadow, incoherent] = &sets[..] else { panic!("four sets") };
+        // Pixels of one batch are neighbours, 16 samples each; all rays start at the camera.
+        let eye = origin(&primary.batches[0], 0);
+        for rays in &primary.batches {
+            for i in 1..POOL {
+                assert_eq!(origin(rays, i), eye);
+                let turned = direction(rays, i).dot(direction(rays, i - 1)).min(1.0).acos();
+                let row_ends = i % (16 * TILE as usize) == 0;
+                assert!(turned < 0.004 || row_ends, "{turned} rad from ray {i} to the next");
+            }
+        }
+        // The box is open at the front: nearly all bounces hit. Lamp rays end at the lamp, so only boxes stop them.
+        assert!(share(diffuse) > 0.7 && share(diffuse) < 1.0, "{}", share(diffuse));
+        assert!(share(shadow) > 0.05 && share(shadow) < 0.6, "{}", share(shadow));
+        assert!(shadow.batches.iter().all(|rays| rays.t_max[..POOL].iter().all(|&t| t == 1.0)));
+        let inside = |p: Vec3| p.cmpge(low).all() && p.cmple(high).all();
+        assert!((0..POOL).all(|i| inside(origin(&incoherent.batches[0], i))));
+        // A bounce does not hit where it starts.
+        accel.intersect(&diffuse.batches[0], 0..POOL, false, &mut hits);
+        let near = (0..POOL).filter(|&i| hits.t[i] < 1e-5).count();
+        assert!(near <= 2, "{near} bounces hit at once");
+    }
+
+    #[test]
+    fn rays_depend_on_the_seed_alone() {
+        let numbers = |seed: u64| -> Vec<u32> {
+            let all = sets(seed).1;
+            all.iter().flat_map(|set| set.batches[2].dx[..POOL].iter().map(|x| x.to_bits())).collect()
+        };
+        let first = numbers(1);
+        assert!(first == numbers(1));
+        let other = numbers(2);
+        for (kind, (a, b)) in Kind::ALL.iter().zip(first.chunks(POOL).zip(other.chunks(POOL))) {
+            assert!(a != b, "{}", kind.name());
+        }
+    }
+
+    #[test]
+    fn some_rays_are_spread_over_all_of_them() {
+        let batches: Vec<_> = (0..3)
+            .map(|b| {
+                let mut rays = RayBatch::new(POOL);
+                (0..POOL).for_each(|i| rays.set(i, Vec3::splat((b * POOL + i) as f32), Vec3::X, 1.0));
+                rays
+            })
+            .collect();
+        let some = RaySet { kind: Kind::Diffuse, batches }.some(6);
+        assert_eq!(some.ox[..6], [0.0, 1024.0, 2048.0, 3072.0, 4096.0, 5120.0]);
+    }
+}

@@ -268,12 +268,7 @@ pub struct RayReport {
 
 impl RayReport {
     /// The report of `scenes` and of those that failed.
-    pub fn new(
-        settings: &RaySettings,
-        cpu: Option<String>,
-        scenes: Vec<SceneRays>,
-        failed: Vec<FailedScene>,
-    ) -> Self {
+    pub fn new(settings: &RaySettings, cpu: Option<String>, scenes: Vec<SceneRays>, failed: Vec<FailedScene>) -> Self {
         let embree = settings.backends.iter().find_map(|backend| match backend {
             Backend::Embree(library) => Some(library.version().to_string()),
             _ => None,
@@ -312,4 +307,69 @@ fn overall(scenes: &[SceneRays]) -> Option<BvhOverEmbree> {
         worst_kind: row.kind,
         bare: of(Setup::Bare)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::linear::Linear;
+    use crate::accel::{RayBatch, Triangles};
+
+    fn contender(backend: &'static str, entry: Option<usize>, setup: Setup) -> Contender {
+        Contender { backend, entry, setup, accel: Box::new(Linear::new(Triangles::default())) }
+    }
+
+    #[test]
+    fn the_faster_entry_of_embree_counts_and_ratios_are_of_the_same_round() {
+        let contenders = [
+            contender("bvh", None, Setup::Prepared),
+            contender("embree", Some(16), Setup::Prepared),
+            contender("embree", Some(1), Setup::Prepared),
+        ];
+        let times = [[2.0, 4.0, 8.0], [5.0, 9.0, 9.0], [4.0, 8.0, 8.0]];
+        let times = times.map(|cpu| Times { cpu: cpu.to_vec(), wall: vec![1.0; 3] });
+        let set = RaySet { kind: Kind::Diffuse, batches: vec![RayBatch::new(2048); 2] };
+        let rows = rows(&set, &contenders.iter().collect::<Vec<_>>(), &times, 1, None);
+        assert_eq!(rows.iter().map(|row| row.backend).collect::<Vec<_>>(), ["bvh", "embree"]);
+        let [bvh, embree] = &rows[..] else { panic!("two rows") };
+        assert_eq!((embree.entry, embree.mrays_per_s), (Some(1), 4096e-6 / 8.0));
+        assert_eq!(embree.other_entry_mrays_per_s, Some(4096e-6 / 9.0));
+        // 4/2, 8/4, 8/8.
+        assert_eq!((bvh.ratio_to_embree, bvh.ratio_quartiles), (Some(2.0), Some([1.5, 2.0])));
+        assert_eq!(bvh.wall_mrays_per_s, Some(4096e-6));
+    }
+
+    #[test]
+    fn a_scene_without_a_front_counts_in_both_setups_and_threads_do_not() {
+        let row = |setup, threads, ratio: f64| Row {
+            kind: Kind::Shadow,
+            backend: "bvh",
+            setup,
+            threads,
+            mrays_per_s: 1.0,
+            wall_mrays_per_s: None,
+            ratio_to_embree: Some(ratio),
+            ratio_quartiles: None,
+            ratio_to_linear: None,
+            rays: 1,
+            entry: None,
+            other_entry_mrays_per_s: None,
+            ratios: vec![ratio; 3],
+        };
+        let geometry = Geometry::default();
+        let scene = |front, rows| {
+            let contenders = Contenders { fast: Vec::new(), linear: None, front };
+            let mut scene = SceneRays::new("a", &geometry, &contenders, Vec::new());
+            scene.rows = rows;
+            scene
+        };
+        let scenes = [
+            scene(0, vec![row(Setup::Prepared, 1, 2.0), row(Setup::Prepared, 2, 9.0)]),
+            scene(5, vec![row(Setup::Prepared, 1, 8.0), row(Setup::Bare, 1, 0.5)]),
+        ];
+        let all = overall(&scenes).unwrap();
+        assert!((all.prepared.geomean - 4.0).abs() < 1e-9 && all.prepared.worst == 2.0);
+        assert!((all.bare.geomean - 1.0).abs() < 1e-9 && all.bare.worst == 0.5);
+        assert_eq!(all.worst_input, "a");
+    }
 }

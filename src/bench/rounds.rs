@@ -78,3 +78,52 @@ pub fn time_linear(kind: Kind, rays: &RayBatch, n: usize, accel: &dyn Accel, rou
     };
     (0..rounds).map(once).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::AccelStats;
+    use crate::bench::contenders::Setup;
+    use std::ops::Range;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Counts the rays it is given.
+    struct Counts(Arc<AtomicUsize>);
+
+    impl Accel for Counts {
+        fn intersect(&self, _: &RayBatch, range: Range<usize>, _: bool, _: &mut HitBatch) {
+            self.0.fetch_add(range.len(), Ordering::Relaxed);
+        }
+
+        fn occluded(&self, _: &RayBatch, n: usize, _: &mut [u8]) {
+            self.0.fetch_add(1_000_000 + n, Ordering::Relaxed);
+        }
+
+        fn stats(&self) -> AccelStats {
+            AccelStats::default()
+        }
+    }
+
+    #[test]
+    fn every_backend_traces_every_ray_once_a_round_with_any_number_of_threads() {
+        for (kind, threads, each) in [(Kind::Diffuse, 3, POOL), (Kind::Shadow, 1, POOL + 1_000_000)] {
+            let counts: Vec<_> = (0..2).map(|_| Arc::new(AtomicUsize::new(0))).collect();
+            let contender = |count: &Arc<AtomicUsize>| Contender {
+                backend: "bvh",
+                entry: None,
+                setup: Setup::Bare,
+                accel: Box::new(Counts(Arc::clone(count))),
+            };
+            let contenders: Vec<_> = counts.iter().map(contender).collect();
+            let set = RaySet { kind, batches: vec![RayBatch::new(POOL); 7] };
+            let pool = crate::render::pool(Some(threads)).unwrap();
+            let times = time(&set, &contenders.iter().collect::<Vec<_>>(), &pool, 2);
+            assert!(times.iter().all(|times| times.cpu.len() == 2 && times.wall.len() == 2));
+            for count in counts {
+                // One round more, which is not counted.
+                assert_eq!(count.load(Ordering::Relaxed), 3 * 7 * each);
+            }
+        }
+    }
+}

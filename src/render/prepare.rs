@@ -306,7 +306,10 @@ fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(Prepare
 ///
 /// # Errors
 /// The backend asked for by name is not to be had.
-pub fn build_accel(geometry: Geometry, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
+pub fn build_accel(
+    geometry: Geometry,
+    settings: &RenderSettings,
+) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
     let requested = match settings.accel {
         AccelChoice::Auto => "auto",
         AccelChoice::Embree => "embree",

@@ -108,9 +108,8 @@ pub fn add_to(command: Command) -> Command {
             built.iter().fold(own, |own, sub| own.mut_subcommand(sub, negatives))
         })
     });
-    command.subcommands(
-        COMMANDS.iter().map(|name| Command::new(*name).hide(true).disable_help_flag(true).arg(anything())),
-    )
+    command
+        .subcommands(COMMANDS.iter().map(|name| Command::new(*name).hide(true).disable_help_flag(true).arg(anything())))
 }
 
 /// Lets negative numbers through to the options' own checks, whose messages name the option.

@@ -19,7 +19,7 @@ pub struct BenchRaysArgs {
     /// Rays are those of the first camera of the default scene, or of one framed on the bounds.
     #[arg(value_name = "INPUT", required = true, value_hint = ValueHint::AnyPath)]
     pub inputs: Vec<PathBuf>,
-    /// Backends, separated by commas: bvh, embree, linear [default: bvh,embree]
+    /// Backends, separated by commas [default: bvh,embree]
     ///
     /// Without Embree on this machine the default is bvh alone. linear is brute force, on fewer rays and one thread.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::bench_backend())]

@@ -68,7 +68,7 @@ Exit codes: 0 all scenes measured; 1 some; 2 usage; 3 none.";
 #[command(version, about, after_long_help = EXAMPLES, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(after_help = "--help says more about each option, with examples and exit codes.")]
 #[command(override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF\n       \
-                      prt-batch retone [OPTIONS] IN...\n       prt-batch bench rays [OPTIONS] INPUT...")]
+                      prt-batch retone [OPTIONS] IN...")]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,

@@ -31,7 +31,9 @@ fn write(command: Command, page: &mut Vec<u8>) -> io::Result<()> {
 /// The section of a command, or those of the commands below it.
 fn write_sub(sub: &Command, name: &str, page: &mut Vec<u8>) -> io::Result<()> {
     if sub.has_subcommands() {
-        return sub.get_subcommands().try_for_each(|below| write_sub(below, &format!("{name} {}", below.get_name()), page));
+        return sub
+            .get_subcommands()
+            .try_for_each(|below| write_sub(below, &format!("{name} {}", below.get_name()), page));
     }
     let mut section = Vec::new();
     let about = sub.get_about().map(ToString::to_string).unwrap_or_default();
