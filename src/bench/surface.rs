@@ -96,7 +96,7 @@ mod tests {
         }
         rays.set(4, Vec3::new(0.0, 0.0, -5.0), Vec3::NEG_Z, f32::INFINITY);
         Linear::new(geometry.clone()).intersect(&rays, 0..5, false, &mut hits);
-        assert_eq!(hits.primitive[..5], [2, 2, 4, 3, MISS]);
+        assert_eq!(hits.primitive[..5], [2, 30, 4, 3, MISS]);
         for i in 0..4 {
             let point = SurfacePoint::of_hit(&geometry, &rays, &hits, i).unwrap();
             let origin = Vec3::new(rays.ox[i], rays.oy[i], rays.oz[i]);
