@@ -6,7 +6,7 @@
 
 use glam::{DMat4, DQuat, DVec3, Vec3};
 use prt::accel::{HitBatch, MISS, RayBatch};
-use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_with};
+use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_placing};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
 
@@ -111,7 +111,7 @@ fn main() {
         for entries in [0.3, 1.0, 3.0] {
             let scene = scene(n, entries);
             let settings = RenderSettings { accel, embree_dirs: vec![".embree".into()], ..RenderSettings::default() };
-            let ready = [Choice::Never, Choice::Always].map(|choice| prepare_with(&scene, &settings, choice));
+            let ready = [Choice::Never, Choice::Always].map(|choice| prepare_placing(&scene, &settings, choice));
             let [Ok(merged), Ok(placed)] = ready else {
                 println!("{accel:?}: not to be had");
                 continue;

@@ -8,6 +8,7 @@
 
 pub mod accel;
 pub mod batch;
+pub mod bench;
 pub mod camera;
 pub mod color;
 pub mod compare;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with those it may use.
-const MAY_USE: [(&str, &[&str]); 18] = [
+const MAY_USE: [(&str, &[&str]); 19] = [
     ("error", &[]),
     ("id", &[]),
     ("math", &[]),
@@ -41,6 +41,7 @@ const MAY_USE: [(&str, &[&str]); 18] = [
             "texture",
         ],
     ),
+    ("bench", &["accel", "camera", "error", "film", "integrator", "load", "math", "render", "sampler", "scene"]),
 ];
 
 /// Sits on top: may use everything but the binary.

@@ -16,7 +16,7 @@ use glam::{DMat4, DQuat, DVec3, Vec3};
 use prepared::{backends, prepared_as, trace};
 use prt::accel::{HitBatch, MISS, RayBatch};
 use prt::material::{AlphaMode, Material};
-use prt::render::{AccelChoice, Choice, Progress, RenderSettings, pool, prepare_with, render_prepared};
+use prt::render::{AccelChoice, Choice, Progress, RenderSettings, pool, prepare_placing, render_prepared};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
 use prt::texture::{Filter, Param};
@@ -57,7 +57,7 @@ fn scene(material: impl FnOnce(&mut SceneBuilder) -> Material) -> Scene {
 }
 
 fn picture(scene: &Scene, settings: &RenderSettings, choice: Choice) -> Vec<[f32; 3]> {
-    let ready = prepare_with(scene, settings, choice).expect("a small scene");
+    let ready = prepare_placing(scene, settings, choice).expect("a small scene");
     let expected = if choice == Choice::Never { 0 } else { 5 };
     assert_eq!(ready.tables.placements.len(), expected, "the floor and four pairs");
     let frame = render_prepared(scene, ready, 0, settings, &Progress::default()).expect("a picture");

@@ -3,6 +3,8 @@ import json
 import math
 import re
 import struct
+import sys
+from array import array
 
 from .vector import aim
 
@@ -84,6 +86,22 @@ class GltfFile:
         made = (attributes, indices, len(shape.triangles))
         self.stored[key] = (shape, made)  # the shape is kept so that its id is not used again
         return made
+
+    def dense(self, mesh):
+        """Stores a `dense.Dense` (positions only, flat arrays) and returns what `geometry` returns."""
+        places = array("f", [round(x, DECIMALS) + 0.0 for x in mesh.positions])
+        indices = array("I", mesh.indices)
+        if sys.byteorder == "big":
+            places.byteswap()
+            indices.byteswap()
+        count = len(places) // 3
+        entry = {"bufferView": self._view(places.tobytes(), target=34962), "componentType": 5126, "count": count, "type": "VEC3"}
+        for word, pick in (("min", min), ("max", max)):
+            entry[word] = [pick(places[i::3]) for i in range(3)]
+        position = self._put("accessors", entry)
+        view = self._view(indices.tobytes(), target=34963)
+        index = self._put("accessors", {"bufferView": view, "componentType": 5125, "count": len(indices), "type": "SCALAR"})
+        return {"POSITION": position}, index, mesh.triangles
 
     def mesh(self, name, *parts):
         """Mesh of (geometry, material) pairs, one primitive each."""

@@ -9,15 +9,18 @@ use super::geometry::Geometry;
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use crate::error::RenderError;
 use build::Built;
-use embree4_rs::{Device, HitsSoAMut, Library, RaysSoA};
+use embree4_rs::{Device, HitsSoAMut, Library, Ray, RaysSoA};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Committed Embree scenes: of the world, and of each object that is placed in it.
+#[derive(Clone)]
 pub struct EmbreeAccel {
-    built: Built,
+    built: Arc<Built>,
+    /// Whether every ray is a call of its own in place of packets.
+    single: bool,
 }
 
 /// The library that [`EmbreeAccel::build`] uses: `EMBREE_DIR`, `folders`, then the system's.
@@ -43,8 +46,32 @@ impl EmbreeAccel {
     /// Embree's own.
     pub fn build_with(geometry: impl Into<Geometry>, library: &Arc<Library>) -> Result<Self, RenderError> {
         match build::build(geometry.into(), library) {
-            Ok(built) => Ok(Self { built }),
+            Ok(built) => Ok(Self { built: Arc::new(built), single: false }),
             Err(e) => Err(RenderError::AccelUnavailable(format!("Embree: {e}"))),
+        }
+    }
+
+    /// The same scene asked ray by ray: for measurements, since scattered rays may be faster so.
+    pub fn in_single_rays(&self) -> Self {
+        Self { single: true, ..self.clone() }
+    }
+
+    /// Rays in a packet: 8 or 16.
+    pub fn packet_width(&self) -> usize {
+        self.built.scene.device().native_width().max(8)
+    }
+
+    /// Nearest hits ray by ray.
+    fn intersect_single(&self, rays: &RayBatch, range: Range<usize>, hits: &mut HitBatch) {
+        let Built { scene, numbers, .. } = &*self.built;
+        for i in range {
+            let Some(hit) = scene.intersect1(&ray(rays, i)) else {
+                (hits.t[i], hits.u[i], hits.v[i], hits.primitive[i]) = (rays.t_max[i], 0.0, 0.0, MISS);
+                continue;
+            };
+            (hits.t[i], hits.u[i], hits.v[i]) = (hit.t, hit.u, hit.v);
+            (hits.instance[i], hits.primitive[i]) =
+                numbers.of(hit.instance, hit.instance_primitive, hit.geometry, hit.primitive);
         }
     }
 
@@ -64,6 +91,12 @@ impl EmbreeAccel {
     }
 }
 
+fn ray(rays: &RayBatch, i: usize) -> Ray {
+    let origin = [rays.ox[i], rays.oy[i], rays.oz[i]];
+    let direction = [rays.dx[i], rays.dy[i], rays.dz[i]];
+    Ray { t_max: rays.t_max[i], time: rays.time[i], id: rays.key[i], ..Ray::new(origin, direction) }
+}
+
 /// Where Embree says which instance was hit.
 #[derive(Default)]
 struct Places {
@@ -79,7 +112,10 @@ thread_local! {
 
 impl Accel for EmbreeAccel {
     fn intersect(&self, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-        let Built { scene, numbers, .. } = &self.built;
+        if self.single {
+            return self.intersect_single(rays, range, hits);
+        }
+        let Built { scene, numbers, .. } = &*self.built;
         let slices = self.rays(rays, range.clone());
         if numbers.are_the_same() {
             let into = HitsSoAMut {
@@ -120,6 +156,10 @@ impl Accel for EmbreeAccel {
     }
 
     fn occluded(&self, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
+        if self.single {
+            let of = |(i, o): (usize, &mut u8)| *o = self.built.scene.occluded1(&ray(rays, i)).into();
+            return occluded[..n].iter_mut().enumerate().for_each(of);
+        }
         self.built.scene.occluded_batch(self.rays(rays, 0..n), false, &mut occluded[..n]);
     }
 

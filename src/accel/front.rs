@@ -35,6 +35,7 @@ pub struct Split {
 }
 
 /// The short list.
+#[derive(Clone)]
 pub struct Big {
     /// Distinct corners.
     corners: Vec<[f32; 3]>,

@@ -28,6 +28,11 @@ impl Linear {
         Self { geometry: geometry.into() }
     }
 
+    /// What is tested.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
     /// Tells `each` of the crossings of ray `i`, in the order of instances.
     fn crossings(&self, rays: &RayBatch, i: usize, mut each: impl FnMut(Found) -> ControlFlow<()>) -> ControlFlow<()> {
         let geometry = &self.geometry;

@@ -13,6 +13,7 @@ mod terminator;
 mod wave;
 
 pub use coverage::Coverage;
+pub use pool::POOL;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;

@@ -108,14 +108,35 @@ impl Parts {
 /// # Errors
 /// The backend is not to be had, or the scene does not fit index types.
 pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, RenderError> {
-    prepare_with(scene, settings, Choice::Auto)
+    prepare_with(scene, settings, |geometry| build_accel(geometry, settings))
 }
 
-/// Prepares `scene` with meshes placed or merged as `choice` says.
+/// [`prepare`] with a backend that the caller builds from what rays can hit: [`build_accel`] is the renderer's own.
 ///
 /// # Errors
-/// As of [`prepare`].
-pub fn prepare_with(scene: &Scene, settings: &RenderSettings, choice: Choice) -> Result<Prepared, RenderError> {
+/// As [`prepare`], and those of `build`.
+pub fn prepare_with(
+    scene: &Scene,
+    settings: &RenderSettings,
+    build: impl FnOnce(Geometry) -> Result<(Box<dyn Accel>, AccelReport), RenderError>,
+) -> Result<Prepared, RenderError> {
+    prepare_all(scene, settings, Choice::Auto, build)
+}
+
+/// [`prepare`] with meshes placed or merged as `choice` says.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_placing(scene: &Scene, settings: &RenderSettings, choice: Choice) -> Result<Prepared, RenderError> {
+    prepare_all(scene, settings, choice, |geometry| build_accel(geometry, settings))
+}
+
+fn prepare_all(
+    scene: &Scene,
+    settings: &RenderSettings,
+    choice: Choice,
+    build: impl FnOnce(Geometry) -> Result<(Box<dyn Accel>, AccelReport), RenderError>,
+) -> Result<Prepared, RenderError> {
     let boxes = Boxes::of(scene);
     let placing = Placing::of(scene, &boxes, choice);
     let count = stored_triangles(scene, &placing);
@@ -188,7 +209,7 @@ pub fn prepare_with(scene: &Scene, settings: &RenderSettings, choice: Choice) ->
     let tables = Arc::new(SceneTables { triangles, placements, materials, textures, lights });
     let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
     geometry.filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(&tables))) as Arc<dyn HitFilter>);
-    let (accel, accel_report) = build_accel(geometry, settings)?;
+    let (accel, accel_report) = build(geometry)?;
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, placed, warnings, losses })
 }
 
@@ -401,7 +422,13 @@ fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(Prepare
 }
 
 /// Chooses and builds the backend.
-fn build_accel(geometry: Geometry, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
+///
+/// # Errors
+/// The backend asked for by name is not to be had.
+pub fn build_accel(
+    geometry: Geometry,
+    settings: &RenderSettings,
+) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
     let requested = match settings.accel {
         AccelChoice::Auto => "auto",
         AccelChoice::Embree => "embree",

@@ -4,7 +4,7 @@
 use glam::{DMat4, DVec3};
 use prt::accel::{HitBatch, MISS, RayBatch};
 use prt::material::Material;
-use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_with};
+use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_placing};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
 use prt::shape::table::interpolate3;
@@ -54,7 +54,7 @@ pub fn prepared(scene: &Scene) -> Prepared {
 pub fn prepared_as(scene: &Scene, accel: AccelChoice, choice: Choice) -> Prepared {
     let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
     let settings = RenderSettings { accel, embree_dirs: vec![folder], ..RenderSettings::default() };
-    prepare_with(scene, &settings, choice).expect("a small scene")
+    prepare_placing(scene, &settings, choice).expect("a small scene")
 }
 
 /// The backends that have placements and run here; `bvh` joins when it has them.

@@ -33,6 +33,9 @@ fn run() -> ExitCode {
     };
     if let Some(name) = unbuilt::asked_for(&matches) {
         let mut text = format!("{name} is not built yet; docs/cli.md says what is");
+        if unbuilt::has_built_parts(&name) {
+            text += &format!("\n  What of {name} is built is told by prt-batch help {name}.");
+        }
         if Path::new(&name).exists() {
             text += &format!("\n  {name} is a command; what is called so in this folder is ./{name}.");
         }
@@ -49,6 +52,9 @@ fn run() -> ExitCode {
     match (cli.command, matches.subcommand()) {
         (Some(args::Command::Compare(options)), _) => commands::compare::run(&options),
         (Some(args::Command::Retone(options)), _) => commands::retone::run(&options),
+        (Some(args::Command::Bench { what: args::BenchCommand::Rays(options) }), _) => {
+            commands::bench_rays::run(&options)
+        }
         (Some(args::Command::Doctor(options)), _) => commands::doctor::run(&options),
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),

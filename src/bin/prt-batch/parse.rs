@@ -203,6 +203,27 @@ pub fn limit(value: &str) -> Result<f64, String> {
     value.parse().ok().filter(inside).ok_or_else(|| "must be a number, 0 or more".into())
 }
 
+/// A backend that can be measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BenchBackend {
+    Bvh,
+    Embree,
+    Linear,
+}
+
+pub fn bench_backend() -> Words<BenchBackend> {
+    use BenchBackend::{Bvh, Embree, Linear};
+    Words::new(&[("bvh", Bvh), ("embree", Embree), ("linear", Linear)], &[])
+}
+
+pub fn bench_rays(value: &str) -> Result<usize, String> {
+    number(value, 1, 1 << 26)
+}
+
+pub fn bench_rounds(value: &str) -> Result<usize, String> {
+    number(value, 1, 1000)
+}
+
 pub fn generate() -> Words<Product> {
     Words::new(Product::NAMES, &[])
 }

@@ -88,7 +88,10 @@ const OPTIONS: &[Unbuilt] = &[
 ];
 
 /// Commands.
-const COMMANDS: &[&str] = &["bench", "verify"];
+const COMMANDS: &[&str] = &["verify"];
+
+/// Commands of which only sub-commands are built.
+const WITHOUT_OWN: &[&str] = &["bench"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {
@@ -96,10 +99,17 @@ pub fn add_to(command: Command) -> Command {
         .mut_subcommand("render", with_options)
         .mut_subcommand("compare", negatives)
         .mut_subcommand("retone", negatives);
-    command.subcommands(COMMANDS.iter().map(|name| {
-        let anything = Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true);
-        Command::new(*name).hide(true).disable_help_flag(true).arg(anything)
-    }))
+    let anything = || Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true).hide(true);
+    let command = WITHOUT_OWN.iter().fold(command, |command, name| {
+        command.mut_subcommand(name, |own| {
+            // Its help is about what is built.
+            let built = own.get_subcommands().map(|sub| sub.get_name().to_owned()).collect::<Vec<_>>();
+            let own = own.subcommand_required(false).arg(anything());
+            built.iter().fold(own, |own, sub| own.mut_subcommand(sub, negatives))
+        })
+    });
+    command
+        .subcommands(COMMANDS.iter().map(|name| Command::new(*name).hide(true).disable_help_flag(true).arg(anything())))
 }
 
 /// Lets negative numbers through to the options' own checks, whose messages name the option.
@@ -121,6 +131,11 @@ pub fn with_options(command: Command) -> Command {
     }))
 }
 
+/// Whether `name` is a command of which sub-commands are built.
+pub fn has_built_parts(name: &str) -> bool {
+    WITHOUT_OWN.contains(&name)
+}
+
 /// Whether `--name` is an option of `render` that is not built.
 pub fn is_unbuilt(name: &str) -> bool {
     OPTIONS.iter().any(|option| option.name == name)
@@ -138,6 +153,7 @@ pub fn asked_for(matches: &ArgMatches) -> Option<String> {
     };
     match matches.subcommand() {
         Some((name, _)) if COMMANDS.contains(&name) => Some(name.to_owned()),
+        Some((name, own)) if WITHOUT_OWN.contains(&name) => own.subcommand().is_none().then(|| name.to_owned()),
         Some((_, inner)) => option(inner),
         None => option(matches),
     }

@@ -4,12 +4,14 @@
 //! Of an option's doc comment the first paragraph is the line of `-h`, all of it the meaning in `--help` and the
 //! tables. A default that clap does not know stands at the end of the first paragraph as `[default: ...]`.
 
+mod bench;
 mod compare;
 mod doctor;
 mod file;
 mod retone;
 mod run;
 
+pub use bench::{BenchCommand, BenchRaysArgs};
 pub use compare::CompareArgs;
 pub use doctor::DoctorArgs;
 pub use file::FileArgs;
@@ -53,6 +55,14 @@ Examples:
 
 Exit codes: 0 all done; 1 some failed; 2 usage; 3 none could be read; 4 a PNG could not be written.";
 
+const EXAMPLES_OF_BENCH_RAYS: &str = "\
+Examples:
+  prt-batch bench rays scenes/*.gltf
+  prt-batch bench rays big.glb --threads 1 --rays 1000000 --json > rays.json
+  prt-batch bench rays small.glb --accel bvh,linear
+
+Exit codes: 0 all scenes measured; 1 some; 2 usage; 3 none.";
+
 /// Path-traces glTF scenes on the CPU, in batches, to linear HDR EXR and tone-mapped PNG.
 #[derive(Debug, Parser)]
 #[command(version, about, after_long_help = EXAMPLES, args_conflicts_with_subcommands = true, max_term_width = 110)]
@@ -80,6 +90,12 @@ pub enum Command {
     /// Tone-map stored EXRs again, no rendering.
     #[command(after_long_help = EXAMPLES_OF_RETONE)]
     Retone(RetoneArgs),
+    /// Measurements on your own scenes and machine.
+    #[command(subcommand_required = true)]
+    Bench {
+        #[command(subcommand)]
+        what: BenchCommand,
+    },
     /// What was found on this machine: processors, memory, Embree; and whether the ray backends work.
     Doctor(DoctorArgs),
 }

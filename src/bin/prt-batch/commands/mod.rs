@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod bench_rays;
 pub mod compare;
 pub mod doctor;
 pub mod explain;

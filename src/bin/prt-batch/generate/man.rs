@@ -20,18 +20,29 @@ fn write(command: Command, page: &mut Vec<u8>) -> io::Result<()> {
     man.render_options_section(page)?;
     // `render` has the options above.
     for sub in command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "render") {
-        let mut section = Vec::new();
-        let about = sub.get_about().map(ToString::to_string).unwrap_or_default();
-        let name = format!("prt-batch {}", sub.get_name());
-        let man = Man::new(sub.clone().display_name(&name).bin_name(name.replace(' ', "\\ ")));
-        man.render_options_section(&mut section)?;
-        let section = String::from_utf8(section).expect("roff is text").replace(".SH ", ".SS ");
-        page.extend(format!(".SH \"PRT\\-BATCH {}\"\n{about}\n{section}", sub.get_name().to_uppercase()).into_bytes());
+        write_sub(sub, sub.get_name(), page)?;
     }
     // Examples as they stand, not filled.
     let examples = command.get_after_long_help().map(ToString::to_string).unwrap_or_default();
     page.extend(format!(".SH EXAMPLES\n.nf\n{}.fi\n", escaped(&examples)).into_bytes());
     man.render_version_section(page)
+}
+
+/// The section of a command, or those of the commands below it.
+fn write_sub(sub: &Command, name: &str, page: &mut Vec<u8>) -> io::Result<()> {
+    if sub.has_subcommands() {
+        return sub
+            .get_subcommands()
+            .try_for_each(|below| write_sub(below, &format!("{name} {}", below.get_name()), page));
+    }
+    let mut section = Vec::new();
+    let about = sub.get_about().map(ToString::to_string).unwrap_or_default();
+    let full = format!("prt-batch {name}");
+    let man = Man::new(sub.clone().display_name(&full).bin_name(full.replace(' ', "\\ ")));
+    man.render_options_section(&mut section)?;
+    let section = String::from_utf8(section).expect("roff is text").replace(".SH ", ".SS ");
+    page.extend(format!(".SH \"PRT\\-BATCH {}\"\n{about}\n{section}", name.to_uppercase()).into_bytes());
+    Ok(())
 }
 
 /// Lines of text that roff leaves as they are.

@@ -10,13 +10,27 @@ fn markers(command: &str) -> [String; 2] {
 /// A table for every command that has options, between its markers.
 pub fn tables(mut command: Command) -> String {
     command.build();
-    let has_options = |sub: &&Command| !sub.is_hide_set() && sub.get_name() != "help";
-    let tables: Vec<_> = command.get_subcommands().filter(has_options).map(table).collect();
+    let mut tables = Vec::new();
+    add_tables(&command, "", &mut tables);
     tables.join("\n")
 }
 
-fn table(command: &Command) -> String {
-    let [before, after] = markers(command.get_name());
+/// Adds those of the commands below `parent`, whose name is `prefix` with a space; of one that has commands of its own,
+/// those alone.
+fn add_tables(parent: &Command, prefix: &str, tables: &mut Vec<String>) {
+    let is_told = |sub: &&Command| !sub.is_hide_set() && sub.get_name() != "help";
+    for command in parent.get_subcommands().filter(is_told) {
+        let name = format!("{prefix}{}", command.get_name());
+        if command.has_subcommands() {
+            add_tables(command, &format!("{name} "), tables);
+        } else {
+            tables.push(table(command, &name));
+        }
+    }
+}
+
+fn table(command: &Command, name: &str) -> String {
+    let [before, after] = markers(name);
     let mut text = format!("{before}\n| option | meaning | default | built |\n|---|---|---|---|\n");
     let args: Vec<_> =
         command.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str())).collect();
