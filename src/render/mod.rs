@@ -18,7 +18,7 @@ pub use features::features;
 pub use frame::{pool, render};
 pub use framing::FRAMING_YFOV;
 pub use pilot::{Pilot, pilot};
-pub use prepare::{Prepared, prepare};
+pub use prepare::{Prepared, geometry, prepare};
 pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
 pub use tracer::{camera, window};

@@ -5,6 +5,7 @@ use super::emission::mean_emissions;
 use super::{AccelChoice, AccelReport, RenderSettings};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
+use crate::accel::geometry::Geometry;
 use crate::accel::{Accel, AccelStats, Triangles, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::SceneTables;
@@ -61,6 +62,30 @@ const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
 /// # Errors
 /// The backend is not to be had, or the scene does not fit index types.
 pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, RenderError> {
+    prepare_with(scene, settings, |geometry| build_accel(geometry, settings))
+}
+
+/// What rays can hit of `scene`, as [`prepare`] gives it to a backend, without building one.
+///
+/// # Errors
+/// The scene does not fit index types.
+pub fn geometry(scene: &Scene, settings: &RenderSettings) -> Result<Geometry, RenderError> {
+    let mut kept = Geometry::default();
+    prepare_with(scene, settings, |geometry| {
+        kept = geometry;
+        let nothing: Box<dyn Accel> = Box::new(Linear::new(Geometry::default()));
+        let report = report(&*nothing, "linear", String::new());
+        Ok((nothing, report))
+    })?;
+    Ok(kept)
+}
+
+/// [`prepare`] with a backend built by `build`.
+fn prepare_with(
+    scene: &Scene,
+    settings: &RenderSettings,
+    build: impl FnOnce(Geometry) -> Result<(Box<dyn Accel>, AccelReport), RenderError>,
+) -> Result<Prepared, RenderError> {
     let count = scene.triangle_count();
     // Records are gathered by signed 32-bit indices, four a triangle.
     if count > (i32::MAX / 4) as usize {
@@ -102,7 +127,7 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
         warnings.push(default_light.darkness(scene));
     }
     let lights = LightTable::new(&lights, environment, &mut triangles);
-    let (accel, accel_report) = build_accel(geometry, settings)?;
+    let (accel, accel_report) = build(geometry.into())?;
     let tables = SceneTables { triangles, materials, textures, lights };
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, warnings, losses })
 }
@@ -290,7 +315,7 @@ fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(Prepare
 }
 
 /// Chooses and builds the backend.
-fn build_accel(geometry: Triangles, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
+fn build_accel(geometry: Geometry, settings: &RenderSettings) -> Result<(Box<dyn Accel>, AccelReport), RenderError> {
     let requested = match settings.accel {
         AccelChoice::Auto => "auto",
         AccelChoice::Embree => "embree",

@@ -49,6 +49,7 @@ fn run() -> ExitCode {
     match (cli.command, matches.subcommand()) {
         (Some(args::Command::Compare(options)), _) => commands::compare::run(&options),
         (Some(args::Command::Retone(options)), _) => commands::retone::run(&options),
+        (Some(args::Command::Verify(options)), _) => commands::verify::run(&options),
         (Some(args::Command::Doctor(options)), _) => commands::doctor::run(&options),
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),

@@ -88,14 +88,15 @@ const OPTIONS: &[Unbuilt] = &[
 ];
 
 /// Commands.
-const COMMANDS: &[&str] = &["bench", "verify"];
+const COMMANDS: &[&str] = &["bench"];
 
 /// `command` with hidden options and commands for everything that is not built.
 pub fn add_to(command: Command) -> Command {
     let command = with_options(command)
         .mut_subcommand("render", with_options)
         .mut_subcommand("compare", negatives)
-        .mut_subcommand("retone", negatives);
+        .mut_subcommand("retone", negatives)
+        .mut_subcommand("verify", negatives);
     command.subcommands(COMMANDS.iter().map(|name| {
         let anything = Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true);
         Command::new(*name).hide(true).disable_help_flag(true).arg(anything)

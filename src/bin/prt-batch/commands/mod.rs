@@ -6,3 +6,4 @@ pub mod explain;
 mod exr_files;
 pub mod render;
 pub mod retone;
+pub mod verify;
