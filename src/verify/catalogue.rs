@@ -51,7 +51,7 @@ pub const ENTRIES: &[Entry] = &[
     Entry { name: "terrain", build: terrain },
     Entry { name: "soup", build: |rng| open(random_soup(500, 0.3, rng)) },
     Entry { name: "slivers", build: |rng| open(slivers(500, 1.0, rng)) },
-    Entry { name: "needles", build: |rng| open(slivers(20_000, 1e3, rng)) },
+    Entry { name: "needles", build: |rng| open(slivers(2000, 1e3, rng)) },
     Entry { name: "stadium", build: stadium },
     Entry { name: "flat", build: flat },
     Entry { name: "copies", build: copies },

@@ -1,6 +1,6 @@
 //! Every backend, in every way that pictures use it, and what each can trace so far.
 
-use super::rays::{Ray, batch};
+use super::rays::{Kind, Ray, batch};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
 use crate::accel::geometry::{Geometry, Object};
@@ -103,6 +103,17 @@ impl Contender {
     /// One of `accel`, for tests.
     pub fn new(name: &'static str, backend: Backend, accel: Arc<dyn Accel>) -> Self {
         Self { name, backend, accel, is_coherent: false }
+    }
+
+    /// Whether it takes part with rays of a kind: Embree's packets for coherent rays may lose others (30 % of the `tiny`
+    /// ones), so the hint is kept for a camera's, there as here.
+    pub fn takes(&self, kind: Kind) -> bool {
+        !self.is_coherent || self.backend != Backend::Embree || kind == Kind::Camera
+    }
+
+    /// Whether hits lie strictly between the ends of a ray, as `accel::Accel` has it; Embree includes them.
+    pub fn keeps_off_ends(&self) -> bool {
+        self.backend != Backend::Embree
     }
 
     /// Traces `rays`, each twice.

@@ -75,6 +75,7 @@ pub fn hits_of(name: &str, subject: &Subject, contenders: &[Contender], settings
 }
 
 fn judge(name: &str, kind: Kind, rays: &[Ray], contenders: &[Contender], oracle: &Oracle<'_>) -> KindReport {
+    let contenders: Vec<&Contender> = contenders.iter().filter(|contender| contender.takes(kind)).collect();
     let answers: Vec<Answers> = contenders.iter().map(|contender| contender.ask(rays)).collect();
     let musts: Vec<Option<Must>> = rays.iter().map(|ray| oracle.must(ray)).collect();
     let mut report = KindReport::new(kind, rays.len());
@@ -85,7 +86,9 @@ fn judge(name: &str, kind: Kind, rays: &[Ray], contenders: &[Contender], oracle:
         for ((contender, answers), tally) in contenders.iter().zip(&answers).zip(&mut report.contenders) {
             let hit = reported(answers, i);
             tally.hits += usize::from(hit.is_some());
-            let mut faults = vec![fault(oracle, ray, musts[i], hit)];
+            let ends = |hit: &Reported| hit.t == 0.0 || hit.t == ray.t_max;
+            let at_end = contender.keeps_off_ends() && hit.as_ref().is_some_and(ends);
+            let mut faults = vec![fault(oracle, ray, musts[i], hit).or(at_end.then_some(Fault::Phantom))];
             all_allowed &= faults[0].is_none();
             if (answers.occluded[i] != 0) != hit.is_some() {
                 faults.push(Some(Fault::Occluded));

@@ -37,12 +37,34 @@ impl Fault {
 
 /// What is allowed of a million rays.
 ///
-/// Our own backends are allowed nothing. Embree ROBUST (4.4.0) is not exact, by its own documentation; what it was found
-/// to do is written down here, so that it shows when it gets worse.
+/// Our own backends are allowed nothing. Embree ROBUST is not exact, and of its faults those of 4.4.0 (AVX-512) are written
+/// down here, at one and a half to two times what the worst built-in mesh showed in 1500 rays a kind, so that it shows
+/// when they grow. What they are:
+/// - Of rays aimed exactly at a corner 1.5 % pass between its triangles (where those are seen flat: none of a bumpy
+///   mesh), of grazing and coplanar ones 0.5 %. Elsewhere its own bar holds, 2e-5.
+/// - Weights are 0 where twice the triangle's area times the direction's length is below 1e-18: meshes of 1e-6 m.
+/// - Distances of grazing hits and slivers leave the triangle; those of `coplanar` rays always did.
+///
+/// What it says about occlusion is what it says about hits, as it must be.
 pub fn allowed_per_million(backend: Backend, kind: Kind, fault: Fault) -> f64 {
-    match (backend, fault, kind) {
-        (Backend::Bvh | Backend::Linear, ..) => 0.0,
-        (Backend::Embree, ..) => 0.0,
+    if backend != Backend::Embree {
+        return 0.0;
+    }
+    match (fault, kind) {
+        (Fault::Occluded, _) | (_, Kind::Invalid) => 0.0,
+        (Fault::Miss, Kind::Vertex) => 30e3,
+        (Fault::Miss, Kind::Grazing | Kind::Coplanar) => 10e3,
+        (Fault::Miss, Kind::Axis | Kind::Far | Kind::Shadow | Kind::Ends) => 2e3,
+        (Fault::Miss, _) => 20.0,
+        (Fault::Phantom, Kind::Coplanar) => 30e3,
+        (Fault::Phantom, Kind::Far | Kind::Grazing) => 4e3,
+        (Fault::Phantom, _) => 20.0,
+        (Fault::Misplaced, Kind::Coplanar) => 500e3,
+        (Fault::Misplaced, Kind::Edge | Kind::Vertex) => 150e3,
+        (Fault::Misplaced, Kind::Shadow | Kind::Ends | Kind::Grazing) => 50e3,
+        (Fault::Misplaced, Kind::Tiny) => 20e3,
+        (Fault::Misplaced, Kind::Far) => 10e3,
+        (Fault::Misplaced, _) => 4e3,
     }
 }
 
@@ -128,15 +150,18 @@ impl KindReport {
         Self { kind, rays, must_hit: 0, disagreements: 0, explained: 0, hit_or_miss: 0, contenders: Vec::new() }
     }
 
-    /// Counts `other`, of the same kind and contenders.
+    /// Counts `other` as well, each contender by its name.
     pub fn add(&mut self, other: Self) {
         self.rays += other.rays;
         self.must_hit += other.must_hit;
         self.disagreements += other.disagreements;
         self.explained += other.explained;
         self.hit_or_miss += other.hit_or_miss;
-        for (tally, other) in self.contenders.iter_mut().zip(other.contenders) {
-            tally.add(other);
+        for other in other.contenders {
+            match self.contenders.iter_mut().find(|tally| tally.name == other.name) {
+                Some(tally) => tally.add(other),
+                None => self.contenders.push(other),
+            }
         }
     }
 }
@@ -187,9 +212,10 @@ impl SubjectReport {
     }
 }
 
-/// Of `rays`, for a share of a million: at least one where any is allowed.
+/// Of `rays`, for a share of a million, three standard deviations of the count included; nothing where nothing is.
 fn allowed(per_million: f64, rays: usize) -> usize {
-    (per_million * 1e-6 * rays as f64).ceil() as usize
+    let mean = per_million * 1e-6 * rays as f64;
+    (mean + 3.0 * mean.sqrt()).ceil() as usize
 }
 
 /// The whole run.

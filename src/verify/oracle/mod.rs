@@ -6,8 +6,8 @@
 //! Why it hides no error. A hit that a backend reports is held against the triangle that it names, without any search, so
 //! the tree cannot excuse a phantom. What must be hit is searched for in boxes made larger by the very bound within which
 //! triangles count, so the tree loses none that matters; and what any backend reports is looked at too, so a triangle that
-//! the tree lost would have to be lost by all backends as well. `tests` compares the search with looking at every
-//! triangle. f64 itself is never in doubt: its roundings are 2^-29 of the bounds, and within the bounds both answers
+//! the tree lost would have to be lost by all backends as well. `tests/verify_hits.rs` compares the search with looking
+//! at every triangle. f64 itself is never in doubt: its roundings are 2^-29 of the bounds, and within the bounds both answers
 //! are allowed.
 
 mod chain;
@@ -83,7 +83,7 @@ pub struct Reported {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wrong {
     /// There is no such instance or primitive, the ray does not meet it, the filter lets the ray through, or t is not
-    /// between the ray's ends.
+    /// between the ray's ends (themselves included: that they are not is a backend's promise, no matter of f64).
     Phantom,
     /// The ray meets it, but between these distances, or elsewhere on it.
     Place([f64; 2]),
@@ -101,12 +101,21 @@ struct Gathered {
 impl<'g> Oracle<'g> {
     /// Makes everything findable.
     pub fn new(geometry: &'g Geometry) -> Self {
+        Self::with_boxes(geometry, |bounds| bounds)
+    }
+
+    /// One that looks at everything for every ray: what the search must agree with.
+    pub fn exhaustive(geometry: &'g Geometry) -> Self {
+        Self::with_boxes(geometry, |_| [DVec3::NEG_INFINITY, DVec3::INFINITY])
+    }
+
+    fn with_boxes(geometry: &'g Geometry, boxed: fn(Box3) -> Box3) -> Self {
         let all = std::iter::once(&geometry.world).chain(&geometry.objects);
-        let objects = all.map(Searchable::new).collect();
+        let objects = all.map(|object| Searchable::new(object, boxed)).collect();
         let empty = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let of = |p: &Placement| {
             let bounds = geometry.objects[p.object as usize].bounds();
-            bounds.map_or(empty, |bounds| p.bounds(bounds).map(|corner| corner.as_dvec3()))
+            boxed(bounds.map_or(empty, |bounds| p.bounds(bounds).map(|corner| corner.as_dvec3())))
         };
         let places: Vec<Box3> = geometry.placements.iter().map(of).collect();
         Self { geometry, objects, places: Tree::new(&places) }
@@ -134,7 +143,7 @@ impl<'g> Oracle<'g> {
     /// # Errors
     /// What is wrong with it.
     pub fn judge(&self, ray: &Ray, hit: &Reported) -> Result<(), Wrong> {
-        let Some(world) = exact(ray).filter(|_| hit.t > 0.0 && hit.t < ray.t_max) else { return Err(Wrong::Phantom) };
+        let Some(world) = exact(ray).filter(|_| hit.t >= 0.0 && hit.t <= ray.t_max) else { return Err(Wrong::Phantom) };
         let Some((object, local)) = self.space(&world, hit.instance) else { return Err(Wrong::Phantom) };
         let t = f64::from(hit.t);
         let place = |range: [f64; 2], is_there: bool| match is_there && range[0] <= t && t <= range[1] {
@@ -272,7 +281,7 @@ impl Gathered {
 }
 
 impl Searchable {
-    fn new(object: &Object) -> Self {
+    fn new(object: &Object, boxed: fn(Box3) -> Box3) -> Self {
         let (mut boxes, mut items, mut moving_extent) = (Vec::new(), Vec::new(), 0.0);
         for (p, part) in object.parts.iter().enumerate() {
             for i in 0..part.triangles.indices.len() {
@@ -282,12 +291,12 @@ impl Searchable {
                     let extent = bounds[0].abs().max(bounds[1].abs()).max_element();
                     moving_extent = f64::max(moving_extent, extent);
                 }
-                boxes.push(bounds);
+                boxes.push(boxed(bounds));
                 items.push(Item::Triangle { part: p as u32, index: i as u32 });
             }
         }
         for (s, (shape, _)) in object.shapes.iter().enumerate() {
-            boxes.push(shape.bounds().map(|c| glam::Vec3::from(c).as_dvec3()));
+            boxes.push(boxed(shape.bounds().map(|c| glam::Vec3::from(c).as_dvec3())));
             items.push(Item::Shape(s as u32));
         }
         Self { tree: Tree::new(&boxes), items, moving_extent }
@@ -352,6 +361,3 @@ fn shape_range(shape: &dyn Shape, ray: &ExactRay) -> Option<([f64; 2], bool)> {
     let slack = 64.0 * EPS * high.abs() + aside / ray.direction.length();
     (low <= high).then(|| ([low - slack, high + slack], ts.iter().all(Option::is_some)))
 }
-
-#[cfg(test)]
-mod tests;

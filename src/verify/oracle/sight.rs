@@ -13,8 +13,8 @@ use glam::DVec3;
 pub struct Sight {
     /// Corners relative to the ray.
     pub corners: [Seen; 3],
-    /// Twice the signed area across the ray.
-    pub det: f64,
+    /// Sum of the edges' lengths across the ray.
+    perimeter: f64,
     /// Least and greatest distance that a hit may have.
     pub t: [f64; 2],
     /// Weights of the second and third corner at the ray itself, clamped to [0, 1].
@@ -40,6 +40,14 @@ fn distance(a: &Seen, b: &Seen) -> f64 {
     (a.x + s * ex).hypot(a.y + s * ey)
 }
 
+/// Whether all edge functions have one sign, and not by f64's own roundings: of a triangle seen edge on all are nearly 0,
+/// wherever the ray is, but no point of a triangle is further from all its edges than its inradius.
+fn is_inside(e: [f64; 3], edges: [f64; 3], perimeter: f64) -> bool {
+    let det = e[0] + e[1] + e[2];
+    let nearest = edges[0].min(edges[1]).min(edges[2]);
+    det != 0.0 && e.iter().all(|e| e * det >= 0.0) && nearest * perimeter <= 1.001 * det.abs()
+}
+
 impl Sight {
     /// How `ray` sees the triangle, whose corners are known within `error` metres; `None` if no backend may report a hit,
     /// at any distance.
@@ -49,15 +57,15 @@ impl Sight {
         let e = [cross(c, b), cross(a, c), cross(b, a)];
         let edges = [distance(b, c), distance(c, a), distance(a, b)];
         let det = e[0] + e[1] + e[2];
-        let inside = det != 0.0 && e.iter().all(|e| e * det >= 0.0);
+        let length = |p: &Seen, q: &Seen| (p.x - q.x).hypot(p.y - q.y);
+        let perimeter = length(a, b) + length(b, c) + length(c, a);
+        let inside = is_inside(e, edges, perimeter);
         let across = a.across.max(b.across).max(c.across);
         if !inside && edges.iter().all(|d| *d > across) {
             return None;
         }
         let ts = [a.t, b.t, c.t];
         let (least, most) = (ts[0].min(ts[1]).min(ts[2]), ts[0].max(ts[1]).max(ts[2]));
-        let length = |p: &Seen, q: &Seen| (p.x - q.x).hypot(p.y - q.y);
-        let perimeter = length(a, b) + length(b, c) + length(c, a);
         // What is left of the area when the corners move by their errors.
         let area = det.abs() - 2.0 * across * (perimeter + 4.0 * across);
         let (mut low, mut high) = (least, most);
@@ -81,7 +89,7 @@ impl Sight {
         }
         let along = a.along.max(b.along).max(c.along);
         let rounding = 10.0 * EPS * most.abs().max(least.abs()) + along + f64::from(f32::MIN_POSITIVE);
-        Some(Self { corners, det, t: [low - rounding, high + rounding], uv, uv_error, edges, inside })
+        Some(Self { corners, perimeter, t: [low - rounding, high + rounding], uv, uv_error, edges, inside })
     }
 
     /// Error of the corners of the edge opposite to corner `i`.
@@ -106,12 +114,11 @@ impl Sight {
         within(u) && within(v) && within(1.0 - u - v) && near(u, self.uv[0]) && near(v, self.uv[1])
     }
 
-    /// Whether the point (`x`, `y`) across the ray is inside, and the share of its distance from the nearest edge in the
-    /// triangle's size.
+    /// Whether the point (`x`, `y`) across the ray is inside, and its distance from the nearest edge.
     pub fn contains(&self, x: f64, y: f64) -> (bool, f64) {
         let [a, b, c] = self.corners.map(|p| Seen { x: p.x - x, y: p.y - y, ..p });
         let e = [cross(&c, &b), cross(&a, &c), cross(&b, &a)];
-        let distance = distance(&a, &b).min(distance(&b, &c)).min(distance(&c, &a));
-        (self.det != 0.0 && e.iter().all(|e| e * self.det >= 0.0), distance)
+        let edges = [distance(&b, &c), distance(&c, &a), distance(&a, &b)];
+        (is_inside(e, edges, self.perimeter), edges[0].min(edges[1]).min(edges[2]))
     }
 }
