@@ -31,6 +31,9 @@ pub struct Subject {
     pub geometry: Geometry,
     /// Where rays that start inside of a closed mesh do so; `None` if it is not closed, or not known to be.
     pub inside: Option<Inside>,
+    /// Backends may disagree about hit or miss of 2 in a million usual rays. Not so where triangles are no larger than the
+    /// error bound (slivers, coordinates far from the origin): there boundaries are everywhere.
+    pub is_ordinary: bool,
 }
 
 /// Where Embree's own watertight test stands (Embree 4, tutorials/verify): vertices are rounded to 1/64 m there.
@@ -39,23 +42,23 @@ const FAR: Vec3 = Vec3::new(148_376.0, 1234.0, -223_423.0);
 /// The table.
 pub const ENTRIES: &[Entry] = &[
     Entry { name: "bumpy", build: |_| bumpy_at(1.0, Vec3::ZERO) },
-    Entry { name: "bumpy-far", build: |_| bumpy_at(1.0, FAR) },
+    Entry { name: "bumpy-far", build: |_| adverse(bumpy_at(1.0, FAR)) },
     Entry { name: "bumpy-small", build: |_| bumpy_at(1e-6, Vec3::ZERO) },
-    Entry { name: "bumpy-small-far", build: |_| bumpy_at(1e-6, FAR) },
+    Entry { name: "bumpy-small-far", build: |_| adverse(bumpy_at(1e-6, FAR)) },
     Entry { name: "bumpy-large", build: |_| bumpy_at(1e6, Vec3::ZERO) },
-    Entry { name: "bumpy-large-far", build: |_| bumpy_at(1e6, FAR) },
+    Entry { name: "bumpy-large-far", build: |_| adverse(bumpy_at(1e6, FAR)) },
     Entry { name: "sphere", build: |_| closed(sphere(100, 200, || 2.0), Vec3::ZERO, 0.5) },
-    Entry { name: "sphere-far", build: |_| closed(placed(&sphere(100, 200, || 2.0), 1.0, FAR), FAR, 0.5) },
+    Entry { name: "sphere-far", build: |_| adverse(closed(placed(&sphere(100, 200, || 2.0), 1.0, FAR), FAR, 0.5)) },
     Entry { name: "room", build: room },
     Entry { name: "grid", build: |_| open(grid(12, -3.0, |_, _| 0.0)) },
     Entry { name: "terrain", build: terrain },
     Entry { name: "soup", build: |rng| open(random_soup(500, 0.3, rng)) },
-    Entry { name: "slivers", build: |rng| open(slivers(500, 1.0, rng)) },
-    Entry { name: "needles", build: |rng| open(slivers(2000, 1e3, rng)) },
+    Entry { name: "slivers", build: |rng| adverse(open(slivers(500, 1.0, rng))) },
+    Entry { name: "needles", build: |rng| adverse(open(slivers(2000, 1e3, rng))) },
     Entry { name: "stadium", build: stadium },
     Entry { name: "flat", build: flat },
-    Entry { name: "copies", build: copies },
-    Entry { name: "garbage-scale", build: mixed_scales },
+    Entry { name: "copies", build: |rng| adverse(copies(rng)) },
+    Entry { name: "mixed-scales", build: |rng| adverse(mixed_scales(rng)) },
     Entry { name: "cutout", build: cutout },
     Entry { name: "moving", build: moving },
     Entry { name: "instances", build: instances },
@@ -64,12 +67,17 @@ pub const ENTRIES: &[Entry] = &[
 ];
 
 fn open(geometry: impl Into<Geometry>) -> Subject {
-    Subject { geometry: geometry.into(), inside: None }
+    Subject { geometry: geometry.into(), inside: None, is_ordinary: true }
+}
+
+/// A subject full of boundaries.
+fn adverse(subject: Subject) -> Subject {
+    Subject { is_ordinary: false, ..subject }
 }
 
 /// `radius` about `centre` is inside.
 fn closed(geometry: impl Into<Geometry>, centre: Vec3, radius: f32) -> Subject {
-    Subject { geometry: geometry.into(), inside: Some(Inside { centre, radius }) }
+    Subject { geometry: geometry.into(), inside: Some(Inside { centre, radius }), is_ordinary: true }
 }
 
 /// pbrt's closed mesh of bumps: 16 x 16, radii 1 to 6.

@@ -52,7 +52,7 @@ pub fn hits(name: &str, subject: &Subject, settings: &Settings) -> Result<Subjec
 /// As [`hits`], with contenders of the caller's own.
 pub fn hits_of(name: &str, subject: &Subject, contenders: &[Contender], settings: &Settings) -> SubjectReport {
     let geometry = &subject.geometry;
-    let mut report = SubjectReport::new(name, geometry, subject.inside.is_some());
+    let mut report = SubjectReport::new(name, subject);
     let Some(aim) = Aim::new(geometry, subject.inside) else { return report };
     let oracle = Oracle::new(geometry);
     let chunks = settings.rays.div_ceil(CHUNK);

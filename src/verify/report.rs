@@ -1,9 +1,9 @@
 //! What was found: counts, limits, and rays to repeat it with.
 
+use super::catalogue::Subject;
 use super::contenders::Backend;
 use super::oracle::Reported;
 use super::rays::{Kind, Ray};
-use crate::accel::geometry::Geometry;
 use serde::Serialize;
 
 /// What can be wrong with an answer.
@@ -174,6 +174,8 @@ pub struct SubjectReport {
     pub triangles: usize,
     pub instances: usize,
     pub closed: bool,
+    /// Whether the limit of disagreements holds.
+    pub ordinary: bool,
     /// Backends that did not take part, and why.
     pub left_out: Vec<String>,
     pub kinds: Vec<KindReport>,
@@ -181,9 +183,17 @@ pub struct SubjectReport {
 
 impl SubjectReport {
     /// No rays yet.
-    pub fn new(name: &str, geometry: &Geometry, closed: bool) -> Self {
-        let (triangles, instances) = (geometry.triangle_count(), geometry.placements.len());
-        Self { name: name.to_owned(), triangles, instances, closed, left_out: Vec::new(), kinds: Vec::new() }
+    pub fn new(name: &str, subject: &Subject) -> Self {
+        let Subject { geometry, inside, is_ordinary } = subject;
+        Self {
+            name: name.to_owned(),
+            triangles: geometry.triangle_count(),
+            instances: geometry.placements.len(),
+            closed: inside.is_some(),
+            ordinary: *is_ordinary,
+            left_out: Vec::new(),
+            kinds: Vec::new(),
+        }
     }
 
     /// What is beyond the limits, in words.
@@ -227,7 +237,7 @@ pub struct Report {
     pub seed: u64,
     /// All rays, each counted once.
     pub rays: usize,
-    /// Of rays as pictures need them (camera, random, bounce, shadow): hit against miss among backends.
+    /// Of rays as pictures need them (camera, random, bounce, shadow) at ordinary subjects: hit against miss among backends.
     pub usual_rays: usize,
     pub usual_hit_or_miss: usize,
     pub subjects: Vec<SubjectReport>,
@@ -239,7 +249,8 @@ impl Report {
     /// Of `subjects`, shot at with `seed`.
     pub fn new(seed: u64, subjects: Vec<SubjectReport>) -> Self {
         let kinds = || subjects.iter().flat_map(|s| &s.kinds);
-        let usual = || kinds().filter(|k| k.kind.is_usual());
+        let ordinary = || subjects.iter().filter(|s| s.ordinary).flat_map(|s| &s.kinds);
+        let usual = || ordinary().filter(|k| k.kind.is_usual());
         let (rays, usual_rays) = (kinds().map(|k| k.rays).sum(), usual().map(|k| k.rays).sum());
         let usual_hit_or_miss = usual().map(|k| k.hit_or_miss).sum();
         let mut problems: Vec<String> = subjects.iter().flat_map(SubjectReport::problems).collect();
