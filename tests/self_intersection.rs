@@ -242,7 +242,7 @@ fn self04_scaled_by_powers_of_two_rays_hit_the_same() {
     for j in -20..=23 {
         let s = 2f32.powi(j);
         let scaled: Vec<Ray> = rays.iter().map(|&(o, d, end)| (o * s, d * s, end)).collect();
-        let found = trace(&WideBvh::build(&placed(&mesh, s, Vec3::ZERO)), &scaled);
+        let found = trace(&WideBvh::build(placed(&mesh, s, Vec3::ZERO)), &scaled);
         assert_eq!(found, expected, "scaled by 2^{j}");
     }
     // A turn by any angle rounds, so hits agree within bounds.

@@ -26,7 +26,7 @@ pub struct Settings {
 
 impl Settings {
     /// Rays of each kind at each subject unless told otherwise.
-    pub const RAYS: usize = 10_000;
+    pub const RAYS: usize = 5000;
 }
 
 /// Rays that are made and traced together. Part of what a seed means: it says where streams of random numbers begin.
