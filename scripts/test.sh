@@ -87,6 +87,11 @@ fi
 
 if [ -n "$long" ]; then
   echo "== Long checks"
+  # BVH-01: a million rays at every mesh and scene.
+  cargo build --locked --quiet --release --bin prt-batch
+  target/release/prt-batch verify hits --rays 71429
+  target/release/prt-batch verify hits scenes/ --rays 71429
+  summary+=("verify hits: passed")
   if [ -x scripts/reference_check.sh ]; then
     scripts/reference_check.sh
     summary+=("reference check: passed")

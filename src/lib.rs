@@ -26,6 +26,7 @@ pub mod sampler;
 pub mod scene;
 pub mod shape;
 pub mod texture;
+pub mod verify;
 
 /// This program's version, as it is written into files.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module with those it may use.
-const MAY_USE: [(&str, &[&str]); 19] = [
+const MAY_USE: [(&str, &[&str]); 20] = [
     ("error", &[]),
     ("id", &[]),
     ("math", &[]),
@@ -23,6 +23,7 @@ const MAY_USE: [(&str, &[&str]); 19] = [
     ("load", &["camera", "color", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
     ("integrator", &["accel", "camera", "light", "material", "math", "sampler", "shape", "texture"]),
     ("compare", &["image"]),
+    ("verify", &["accel", "error", "math"]),
     (
         "render",
         &[

@@ -126,7 +126,7 @@ fn every_option_is_used_by_some_test_of_the_program() {
     let files = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| runs_the_program(path));
     let text: String = files.map(|path| fs::read_to_string(path).unwrap()).collect();
     let mut options = options_of(&printed(&["-h"]));
-    for command in [&["compare"][..], &["retone"], &["doctor"], &["bench", "rays"]] {
+    for command in [&["compare"][..], &["retone"], &["doctor"], &["verify"], &["bench", "rays"]] {
         options.extend(options_of(&printed(&[command, &["-h"]].concat())));
     }
     assert!(options.len() > 40, "{options:?}");

@@ -22,7 +22,7 @@ pub use frame::{pool, render, render_prepared};
 pub use framing::FRAMING_YFOV;
 pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
-pub use prepare::{PlacedReport, Prepared, build_accel, prepare, prepare_placing, prepare_with};
+pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};
 pub use progress::{Phase, Progress};
 pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
 pub use tracer::{camera, window};

@@ -111,6 +111,21 @@ pub fn prepare(scene: &Scene, settings: &RenderSettings) -> Result<Prepared, Ren
     prepare_with(scene, settings, |geometry| build_accel(geometry, settings))
 }
 
+/// What rays can hit of `scene`, as [`prepare`] gives it to a backend, without building one.
+///
+/// # Errors
+/// The scene does not fit index types.
+pub fn geometry(scene: &Scene, settings: &RenderSettings) -> Result<Geometry, RenderError> {
+    let mut kept = Geometry::default();
+    prepare_with(scene, settings, |geometry| {
+        kept = geometry;
+        let nothing: Box<dyn Accel> = Box::new(Linear::new(Geometry::default()));
+        let report = report(&*nothing, "linear", String::new());
+        Ok((nothing, report))
+    })?;
+    Ok(kept)
+}
+
 /// [`prepare`] with a backend that the caller builds from what rays can hit: [`build_accel`] is the renderer's own.
 ///
 /// # Errors

@@ -57,10 +57,10 @@ pub fn prepared_as(scene: &Scene, accel: AccelChoice, choice: Choice) -> Prepare
     prepare_placing(scene, &settings, choice).expect("a small scene")
 }
 
-/// The backends that have placements and run here; `bvh` joins when it has them.
+/// The backends that run here.
 pub fn backends() -> Vec<AccelChoice> {
     let folder = std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
-    let mut all = vec![AccelChoice::Linear];
+    let mut all = vec![AccelChoice::Linear, AccelChoice::Bvh];
     match prt::accel::embree::find(&[folder]) {
         Ok(_) => all.push(AccelChoice::Embree),
         Err(why) => println!("skipped: no Embree library ({why})"),

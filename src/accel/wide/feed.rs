@@ -91,7 +91,7 @@ fn gathered<L: Lanes>(rays: &RayBatch, which: [usize; WIDTH], scene: &[[f32; 3];
 
 /// One ray in a space of its own, in every lane; `None` if it is none there.
 #[inline(always)]
-pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) -> Option<(SingleRay<L>, u32)> {
+pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) -> Option<Ready<L>> {
     let o = [L::F::splat(origin.x), L::F::splat(origin.y), L::F::splat(origin.z)];
     let d = [L::F::splat(direction.x), L::F::splat(direction.y), L::F::splat(direction.z)];
     let lanes = RayLanes::<L>::of(o, d, L::F::splat(f32::INFINITY), scene);
@@ -101,6 +101,9 @@ pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) ->
     let shape = lanes.shape(0);
     Some((SingleRay::of_lanes(&lanes, shape), shape.octant()))
 }
+
+/// A ray and where its octant begins in the nodes' orders.
+pub type Ready<L> = (SingleRay<L>, u32);
 
 /// Hands tasks out.
 pub struct Feed<'a, L: Lanes, T: Tasks> {
@@ -124,7 +127,7 @@ impl<'a, L: Lanes, T: Tasks> Feed<'a, L, T> {
 
     /// The next task with its ray and the ray's octant; without them if the ray is none.
     #[inline(always)]
-    pub fn next(&mut self) -> Option<(Task, Option<(SingleRay<L>, u32)>)> {
+    pub fn next(&mut self) -> Option<(Task, Option<Ready<L>>)> {
         if self.next >= self.tasks.len() {
             return None;
         }

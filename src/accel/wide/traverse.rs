@@ -10,7 +10,7 @@
 //! rays: 1.0 and 1.2; 6 as 4), nothing gained or lost where the tree is small. Stopping at leaves as well: 1.1 times as
 //! fast again in the terrain, 0.9 elsewhere.
 
-use super::feed::{Feed, Task, Tasks, single};
+use super::feed::{Feed, Ready, Task, Tasks, single};
 use super::leaf::{self, Asked, Nearest};
 use super::node::{Child, WIDTH};
 use super::ray::{SingleRay, box_end};
@@ -47,7 +47,7 @@ struct Slot<'a, L: Lanes> {
     enter: [f32; STACK + WIDTH],
     children: [u32; STACK + WIDTH],
     /// The ray in the world and its octant, while it is in a placed object.
-    outer: (SingleRay<L>, u32),
+    outer: Ready<L>,
 }
 
 /// What is asked about rays.

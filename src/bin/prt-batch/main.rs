@@ -55,6 +55,7 @@ fn run() -> ExitCode {
         (Some(args::Command::Bench { what: args::BenchCommand::Rays(options) }), _) => {
             commands::bench_rays::run(&options)
         }
+        (Some(args::Command::Verify(options)), _) => commands::verify::run(&options),
         (Some(args::Command::Doctor(options)), _) => commands::doctor::run(&options),
         (Some(args::Command::Render(_)), Some((_, matches))) => commands::render::run(matches),
         _ => commands::render::run(&matches),

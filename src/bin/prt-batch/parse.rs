@@ -1,5 +1,6 @@
 //! Values of options: what is allowed, and what is of the contract but not built.
 
+use crate::args::What;
 use crate::generate::Product;
 use crate::words::Words;
 use clap::builder::{PossibleValue, TypedValueParser};
@@ -8,6 +9,7 @@ use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
+use prt::verify::contenders::Backend;
 use std::ffi::OsStr;
 use std::str::FromStr;
 
@@ -222,6 +224,19 @@ pub fn bench_rays(value: &str) -> Result<usize, String> {
 
 pub fn bench_rounds(value: &str) -> Result<usize, String> {
     number(value, 1, 1000)
+}
+
+pub fn verify() -> Words<What> {
+    Words::new(&[("hits", What::Hits)], &["materials", "light", "lens", "shapes", "output"])
+}
+
+pub fn backend() -> Words<Backend> {
+    Words::new(&[("bvh", Backend::Bvh), ("embree", Backend::Embree), ("linear", Backend::Linear)], &[])
+}
+
+/// Rays of each kind at each mesh.
+pub fn rays(value: &str) -> Result<usize, String> {
+    number(value, 1, 100_000_000)
 }
 
 pub fn generate() -> Words<Product> {

@@ -87,9 +87,6 @@ const OPTIONS: &[Unbuilt] = &[
     option("Terminal", "display", "HOST:PORT", "Show pictures as they grow in tev"),
 ];
 
-/// Commands.
-const COMMANDS: &[&str] = &["verify"];
-
 /// Commands of which only sub-commands are built.
 const WITHOUT_OWN: &[&str] = &["bench"];
 
@@ -98,18 +95,17 @@ pub fn add_to(command: Command) -> Command {
     let command = with_options(command)
         .mut_subcommand("render", with_options)
         .mut_subcommand("compare", negatives)
-        .mut_subcommand("retone", negatives);
+        .mut_subcommand("retone", negatives)
+        .mut_subcommand("verify", negatives);
     let anything = || Arg::new("anything").num_args(0..).trailing_var_arg(true).allow_hyphen_values(true).hide(true);
-    let command = WITHOUT_OWN.iter().fold(command, |command, name| {
+    WITHOUT_OWN.iter().fold(command, |command, name| {
         command.mut_subcommand(name, |own| {
             // Its help is about what is built.
             let built = own.get_subcommands().map(|sub| sub.get_name().to_owned()).collect::<Vec<_>>();
             let own = own.subcommand_required(false).arg(anything());
             built.iter().fold(own, |own, sub| own.mut_subcommand(sub, negatives))
         })
-    });
-    command
-        .subcommands(COMMANDS.iter().map(|name| Command::new(*name).hide(true).disable_help_flag(true).arg(anything())))
+    })
 }
 
 /// Lets negative numbers through to the options' own checks, whose messages name the option.
@@ -152,7 +148,6 @@ pub fn asked_for(matches: &ArgMatches) -> Option<String> {
         found.map(|option| format!("--{}", option.name))
     };
     match matches.subcommand() {
-        Some((name, _)) if COMMANDS.contains(&name) => Some(name.to_owned()),
         Some((name, own)) if WITHOUT_OWN.contains(&name) => own.subcommand().is_none().then(|| name.to_owned()),
         Some((_, inner)) => option(inner),
         None => option(matches),

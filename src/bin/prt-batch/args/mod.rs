@@ -10,6 +10,7 @@ mod doctor;
 mod file;
 mod retone;
 mod run;
+mod verify;
 
 pub use bench::{BenchCommand, BenchRaysArgs};
 pub use compare::CompareArgs;
@@ -17,6 +18,7 @@ pub use doctor::DoctorArgs;
 pub use file::FileArgs;
 pub use retone::RetoneArgs;
 pub use run::RunArgs;
+pub use verify::{VerifyArgs, What};
 
 use crate::generate::Product;
 use crate::parse;
@@ -63,12 +65,20 @@ Examples:
 
 Exit codes: 0 all scenes measured; 1 some; 2 usage; 3 none.";
 
+const EXAMPLES_OF_VERIFY: &str = "\
+Examples:
+  prt-batch verify hits                        every ray backend at the built-in meshes
+  prt-batch verify hits scenes/ --rays 100000  at scenes of your own
+  prt-batch verify hits --accel bvh,embree --seed 7 --json > hits.json
+
+Exit codes: 0 within limits; 1 not; 2 usage; 3 an input or a backend that was asked for is not to be had.";
+
 /// Path-traces glTF scenes on the CPU, in batches, to linear HDR EXR and tone-mapped PNG.
 #[derive(Debug, Parser)]
 #[command(version, about, after_long_help = EXAMPLES, args_conflicts_with_subcommands = true, max_term_width = 110)]
 #[command(after_help = "--help says more about each option, with examples and exit codes.")]
 #[command(override_usage = "prt-batch [OPTIONS] INPUT...\n       prt-batch compare [OPTIONS] A... REF\n       \
-                      prt-batch retone [OPTIONS] IN...")]
+                      prt-batch retone [OPTIONS] IN...\n       prt-batch verify [OPTIONS] [hits] [INPUT...]")]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -96,6 +106,9 @@ pub enum Command {
         #[command(subcommand)]
         what: BenchCommand,
     },
+    /// Self-tests: do the ray backends hit what they must, decided in f64?
+    #[command(after_long_help = EXAMPLES_OF_VERIFY)]
+    Verify(VerifyArgs),
     /// What was found on this machine: processors, memory, Embree; and whether the ray backends work.
     Doctor(DoctorArgs),
 }

@@ -7,3 +7,4 @@ pub mod explain;
 mod exr_files;
 pub mod render;
 pub mod retone;
+pub mod verify;

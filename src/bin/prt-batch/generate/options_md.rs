@@ -1,6 +1,6 @@
 //! The tables of options in `docs/cli.md`.
 
-use clap::{Arg, Command};
+use clap::{Arg, ArgAction, Command};
 
 /// What stands before and after the table of a command.
 fn markers(command: &str) -> [String; 2] {
@@ -83,7 +83,8 @@ fn row(arg: &Arg) -> String {
 fn spelling(arg: &Arg) -> String {
     let value = arg.get_value_names().map(|names| names.join(" ")).unwrap_or_default();
     let Some(long) = arg.get_long() else {
-        let dots = if value.contains("...") { "" } else { "..." };
+        let is_many = matches!(arg.get_action(), ArgAction::Append) && !value.contains("...");
+        let dots = if is_many { "..." } else { "" };
         return format!("`{value}{dots}`");
     };
     let short = arg.get_short().map(|short| format!("-{short}, ")).unwrap_or_default();

@@ -15,6 +15,7 @@ mod screen;
 mod style;
 mod table;
 mod text;
+pub mod verify_table;
 mod watch;
 
 pub use output::{error, interrupted, say, say_in_panic, warning};

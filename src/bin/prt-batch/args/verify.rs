@@ -1,0 +1,50 @@
+//! Options of `prt-batch verify`.
+
+use crate::parse;
+use clap::{Args, ValueHint};
+use prt::verify::contenders::Backend;
+use prt::verify::hits::Settings;
+use std::path::PathBuf;
+
+/// What is verified.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// What rays hit.
+    Hits,
+}
+
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    /// What is verified
+    ///
+    /// hits: what rays hit, by every backend against f64.
+    #[arg(value_name = "WHAT", default_value = "hits", value_parser = parse::verify())]
+    pub what: What,
+    /// .gltf, .glb and .obj files, or folders of them [default: the built-in meshes]
+    ///
+    /// Of each its default scene.
+    #[arg(value_name = "INPUT", value_hint = ValueHint::AnyPath)]
+    pub inputs: Vec<PathBuf>,
+    /// Rays of each kind at each mesh or scene
+    #[arg(long, value_name = "N", default_value_t = Settings::RAYS, value_parser = parse::rays)]
+    pub rays: usize,
+    /// Other seeds, other rays
+    #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed)]
+    pub seed: u64,
+    /// Ray backends, separated by commas [default: all that are to be had]
+    ///
+    /// linear, brute force, takes part where there are at most 1000 triangles.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::backend())]
+    pub accel: Vec<Backend>,
+    /// Worker threads; they do not change what is found [default: the cores this process may use]
+    #[arg(short, long, value_name = "N", value_parser = parse::threads)]
+    pub threads: Option<usize>,
+    /// Print the result as JSON on stdout
+    ///
+    /// Its fields are below.
+    #[arg(long)]
+    pub json: bool,
+    /// A row for every kind of rays, and more rays to repeat faults with
+    #[arg(short, long)]
+    pub verbose: bool,
+}

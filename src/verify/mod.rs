@@ -1,0 +1,13 @@
+//! Self-tests that a user can run: `prt-batch verify`.
+//!
+//! `hits` shoots rays (`rays`) at built-in meshes (`catalogue`, of `meshes`) or the user's scenes with every backend
+//! (`contenders`) and holds the answers against f64 (`oracle`); `report` has counts and limits.
+
+pub mod catalogue;
+pub mod contenders;
+pub mod hits;
+pub mod meshes;
+pub mod oracle;
+pub mod rays;
+pub mod report;
+pub mod rng;
