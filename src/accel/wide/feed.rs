@@ -1,74 +1,57 @@
-//! Rays and where in the tree they start, prepared eight at a time and handed out one after the other.
+//! Rays prepared eight at a time and handed out one after the other.
 
-use super::node::{Child, WIDTH};
+use super::node::WIDTH;
 use super::ray::{RayLanes, SingleRay};
 use crate::accel::RayBatch;
 use glam::Vec3;
 use simd::{Float, Lanes};
 use std::ops::Range;
 
-/// A ray that is to be followed from a node or leaf on.
-#[derive(Clone, Copy, Debug)]
-pub struct Task {
-    /// Which of the batch.
-    pub ray: u32,
-    /// Where to start.
-    pub child: Child,
-    /// Where the ray enters that.
-    pub enter: f32,
-}
-
-/// Tasks, numbered.
-pub trait Tasks {
+/// Which rays of a batch are to be followed.
+pub trait Which {
     /// How many there are.
     fn len(&self) -> usize;
-    /// Task `k`.
-    fn get(&self, k: usize) -> Task;
-    /// Rays of eight tasks from `k` on; less at the end.
+    /// Which of the batch number `k` is.
+    fn get(&self, k: usize) -> usize;
+    /// Eight from number `k` on; past the end any.
     fn lanes<L: Lanes>(&self, rays: &RayBatch, k: usize, scene: &[[f32; 3]; 2]) -> RayLanes<L>;
 }
 
-/// All rays of a range, from the root on.
-pub struct Whole {
-    pub range: Range<usize>,
-    pub root: Child,
-}
-
-impl Tasks for Whole {
+impl Which for Range<usize> {
     #[inline(always)]
     fn len(&self) -> usize {
-        self.range.len()
+        ExactSizeIterator::len(self)
     }
 
     #[inline(always)]
-    fn get(&self, k: usize) -> Task {
-        Task { ray: (self.range.start + k) as u32, child: self.root, enter: 0.0 }
+    fn get(&self, k: usize) -> usize {
+        self.start + k
     }
 
     #[inline(always)]
     fn lanes<L: Lanes>(&self, rays: &RayBatch, k: usize, scene: &[[f32; 3]; 2]) -> RayLanes<L> {
-        let at = self.range.start + k;
+        let at = self.start + k;
         if at + WIDTH <= rays.capacity() {
             return RayLanes::new(rays, at, scene);
         }
-        gathered(rays, std::array::from_fn(|i| (at + i).min(self.range.end - 1)), scene)
+        gathered(rays, std::array::from_fn(|i| (at + i).min(self.end - 1)), scene)
     }
 }
 
-impl Tasks for &[Task] {
+impl Which for &[u32] {
     #[inline(always)]
     fn len(&self) -> usize {
-        <[Task]>::len(self)
+        <[u32]>::len(self)
     }
 
     #[inline(always)]
-    fn get(&self, k: usize) -> Task {
-        self[k]
+    fn get(&self, k: usize) -> usize {
+        self[k] as usize
     }
 
     #[inline(always)]
     fn lanes<L: Lanes>(&self, rays: &RayBatch, k: usize, scene: &[[f32; 3]; 2]) -> RayLanes<L> {
-        gathered(rays, std::array::from_fn(|i| self[(k + i).min(<[Task]>::len(self) - 1)].ray as usize), scene)
+        gathered(rays, std::array::from_fn(|i| self[(k + i).min(<[u32]>::len(self) - 1)] as usize), scene)
     }
 }
 
@@ -105,9 +88,9 @@ pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) ->
 /// A ray and where its octant begins in the nodes' orders.
 pub type Ready<L> = (SingleRay<L>, u32);
 
-/// Hands tasks out.
-pub struct Feed<'a, L: Lanes, T: Tasks> {
-    tasks: T,
+/// Hands rays out.
+pub struct Feed<'a, L: Lanes, W: Which> {
+    which: W,
     rays: &'a RayBatch,
     scene: &'a [[f32; 3]; 2],
     next: usize,
@@ -115,33 +98,33 @@ pub struct Feed<'a, L: Lanes, T: Tasks> {
     stored: [[f32; WIDTH]; 18],
 }
 
-impl<'a, L: Lanes, T: Tasks> Feed<'a, L, T> {
-    /// There must be a task.
+impl<'a, L: Lanes, W: Which> Feed<'a, L, W> {
+    /// There must be a ray.
     #[inline(always)]
-    pub fn new(tasks: T, rays: &'a RayBatch, scene: &'a [[f32; 3]; 2]) -> Self {
-        let lanes = tasks.lanes::<L>(rays, 0, scene);
+    pub fn new(which: W, rays: &'a RayBatch, scene: &'a [[f32; 3]; 2]) -> Self {
+        let lanes = which.lanes::<L>(rays, 0, scene);
         let mut stored = [[0.0; WIDTH]; 18];
         lanes.store(&mut stored);
-        Self { tasks, rays, scene, next: 0, lanes, stored }
+        Self { which, rays, scene, next: 0, lanes, stored }
     }
 
-    /// The next task with its ray and the ray's octant; without them if the ray is none.
+    /// The next one's place in the batch, and the ray if it is one.
     #[inline(always)]
-    pub fn next(&mut self) -> Option<(Task, Option<Ready<L>>)> {
-        if self.next >= self.tasks.len() {
+    pub fn next(&mut self) -> Option<(usize, Option<Ready<L>>)> {
+        if self.next >= self.which.len() {
             return None;
         }
         let lane = self.next % WIDTH;
         if lane == 0 && self.next > 0 {
-            self.lanes = self.tasks.lanes(self.rays, self.next, self.scene);
+            self.lanes = self.which.lanes(self.rays, self.next, self.scene);
             self.lanes.store(&mut self.stored);
         }
-        let task = self.tasks.get(self.next);
+        let i = self.which.get(self.next);
         self.next += 1;
         if self.lanes.valid >> lane & 1 == 0 {
-            return Some((task, None));
+            return Some((i, None));
         }
         let shape = self.lanes.shape(lane);
-        Some((task, Some((SingleRay::new(&self.stored, lane, shape), shape.octant()))))
+        Some((i, Some((SingleRay::new(&self.stored, lane, shape), shape.octant()))))
     }
 }

@@ -1,8 +1,12 @@
 //! Our own 8-wide BVH: `bvh`, the fallback where there is no Embree.
 //!
-//! `build` makes a binary SAH tree of `reference`s, split where `bins` says; `collapse` merges it to nodes of up to 8
-//! children and leaves of up to 8 triangles, `traverse` runs single rays through it and `packet` camera rays: `ray` tests
-//! boxes, `leaf` triangles. `node` is the memory layout.
+//! Triangles at rest: `build` makes a binary SAH tree of `reference`s of a `source`, split where `bins` says; `collapse`
+//! merges it to nodes of up to 8 children and leaves of up to 8 triangles (`node` is the memory layout). Whatever else
+//! there is - placed objects, exact shapes (`special`), `moving` triangles - is a box of a second tree, whose nodes lie
+//! behind those of the first and lead to it.
+//!
+//! `queries` sends a batch through `packet`s, as far as its rays belong together, and the others one by one through
+//! `traverse`, which `feed` gives them to. `ray` tests boxes, `leaf` triangles.
 
 mod bins;
 mod build;

@@ -10,7 +10,7 @@
 //! rays: 1.0 and 1.2; 6 as 4), nothing gained or lost where the tree is small. Stopping at leaves as well: 1.1 times as
 //! fast again in the terrain, 0.9 elsewhere.
 
-use super::feed::{Feed, Ready, Task, Tasks, single};
+use super::feed::{Feed, Ready, Which, single};
 use super::leaf::{self, Asked, Nearest};
 use super::node::{Child, WIDTH};
 use super::ray::{SingleRay, box_end};
@@ -54,19 +54,17 @@ struct Slot<'a, L: Lanes> {
 pub trait Query {
     /// Whether any hit will do.
     const ANY: bool;
-    /// What is known of ray `i` before its task.
-    fn start(&self, i: usize) -> Nearest;
-    /// What the task found; rays with several tasks are told of more than once.
+    /// What was found for ray `i`.
     fn done(&mut self, i: usize, nearest: &Nearest);
 }
 
-/// Follows all `tasks`. `TOP`: there are specials.
+/// Follows the rays that are `which`. `TOP`: there are specials.
 #[inline(always)]
-pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch, tasks: impl Tasks, query: &mut Q) {
-    if tasks.len() == 0 {
+pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch, which: impl Which, query: &mut Q) {
+    if which.len() == 0 {
         return;
     }
-    let mut feed = Feed::<L, _>::new(tasks, rays, &bvh.world.tree.bounds);
+    let mut feed = Feed::<L, _>::new(which, rays, &bvh.world.tree.bounds);
     let (nowhere, _) = single::<L>(Vec3::ZERO, Vec3::Z, &[[0.0; 3]; 2]).expect("a ray");
     let mut slots: [Slot<'_, L>; SLOTS] = std::array::from_fn(|_| Slot {
         space: &bvh.world,
@@ -107,38 +105,27 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch
     }
 }
 
-/// Puts the next task that needs following into `slot`; false if there is none.
+/// Puts the next ray that is one into `slot`; false if there is no more.
 #[inline(always)]
-fn fill<'a, L: Lanes, T: Tasks>(
+fn fill<'a, L: Lanes, W: Which>(
     world: &'a Space,
-    feed: &mut Feed<'_, L, T>,
+    feed: &mut Feed<'_, L, W>,
     rays: &RayBatch,
     slot: &mut Slot<'a, L>,
     query: &mut impl Query,
 ) -> bool {
-    while let Some((task, ray)) = feed.next() {
-        let Task { ray: i, child, enter } = task;
-        let nearest = query.start(i as usize);
-        let end = box_end(nearest.t);
+    while let Some((i, ray)) = feed.next() {
+        let nearest = Nearest::none(rays.t_max[i]);
         let Some((ray, octant)) = ray else {
-            query.done(i as usize, &nearest);
+            query.done(i, &nearest);
             continue;
         };
-        // An earlier task of the ray may have ended it.
-        if enter > end || any_is_found(query, &nearest) {
-            continue;
-        }
-        (slot.ray, slot.octant, slot.i, slot.end, slot.nearest) = (ray, octant, i as usize, end, nearest);
-        (slot.space, slot.child, slot.len, slot.base) = (world, child, 0, 0);
-        (slot.asked.key, slot.asked.instance) = (rays.key[i as usize], 0);
+        (slot.ray, slot.octant, slot.i, slot.end, slot.nearest) = (ray, octant, i, box_end(nearest.t), nearest);
+        (slot.space, slot.child, slot.len, slot.base) = (world, world.root, 0, 0);
+        (slot.asked.key, slot.asked.instance) = (rays.key[i], 0);
         return true;
     }
     false
-}
-
-#[inline(always)]
-fn any_is_found<Q: Query>(_: &Q, nearest: &Nearest) -> bool {
-    Q::ANY && nearest.primitive != MISS
 }
 
 /// Goes on with a ray until it is done (false) or asks for memory that may be far (true).
@@ -150,10 +137,11 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &Ray
     let by_1 = L::U::load(&[1, 0, 3, 2, 5, 4, 7, 6], 0);
     let none = L::F::splat(f32::INFINITY);
     let (mut child, mut len, mut end) = (slot.child, slot.len, slot.end);
+    // Not read through the slot at every step: it changes all the time.
+    let (mut nodes, mut leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
     loop {
         let mut next = None;
         if child.is_leaf() {
-            let leaves = &slot.space.tree.leaves;
             if Q::ANY {
                 if leaf::occluded(leaves, child, &slot.ray, &slot.asked, slot.nearest.t) {
                     slot.nearest.primitive = 0;
@@ -169,9 +157,10 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &Ray
                 return false;
             }
             end = box_end(slot.nearest.t);
+            (nodes, leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
             next = found;
         } else {
-            let node = &slot.space.tree.nodes[child.node()];
+            let node = &nodes[child.node()];
             let (hit, enter) = slot.ray.test_boxes(&node.planes, L::F::splat(end));
             let at = len % STACK;
             // Where boxes are entered, unique by the lane's number in the lowest bits: off by 7 ulp at most.
@@ -196,6 +185,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &Ray
                 if len == slot.base {
                     if TOP && len > 0 {
                         leave(bvh, slot);
+                        (nodes, leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
                         continue;
                     }
                     return false;
@@ -208,7 +198,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &Ray
             },
         };
         if child.is_far() {
-            prefetch(&slot.space.tree.nodes, child.node(), 4);
+            prefetch(nodes, child.node(), 4);
             (slot.child, slot.len, slot.end) = (child, len, end);
             return true;
         }
