@@ -32,7 +32,8 @@ fn example_scenes_keep_their_light() {
     for path in files(&folder) {
         let (scene, _) = load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let (used, emitted) = auto(&scene);
-        assert!(!used, "{}: {emitted:?}", path.display());
+        // The forest is one under the studio's sky.
+        assert_eq!(used, path.ends_with("forest.gltf"), "{}: {emitted:?}", path.display());
     }
 }
 

@@ -323,15 +323,18 @@ impl<L: Lanes> Packet<L> {
 struct Crossing<L: Lanes> {
     /// T / det.
     t: L::F,
+    /// What that may be off by: three roundings of the distances of the corners.
+    slack: L::F,
     /// Edge functions.
     edges: [L::F; 3],
     /// Distances of the corners.
     corners: [L::F; 3],
-    /// The line passes inside, ahead of the origin.
+    /// The line passes inside, between the ray's ends.
     inside: L::M,
 }
 
-/// Two hits are told apart by `T / det` when they differ by more than this share: three roundings each.
+/// Hits are told apart, from each other and from the ray's ends, by `T / det` when they differ by more than this share of
+/// the distances of the corners: 16 eps. Closer ones, and those that overflow, by the exact test.
 const CLOSE: f32 = 1e-6;
 
 impl<L: Lanes> Crossing<L> {
@@ -339,7 +342,7 @@ impl<L: Lanes> Crossing<L> {
     #[inline(always)]
     fn none(t_max: L::F) -> Self {
         let zero = L::F::zero();
-        Self { t: t_max, edges: [zero; 3], corners: [zero; 3], inside: L::M::from_bits(0) }
+        Self { t: t_max, slack: zero, edges: [zero; 3], corners: [zero; 3], inside: L::M::from_bits(0) }
     }
 
     /// `self` where `mask`, else `other`.
@@ -348,6 +351,7 @@ impl<L: Lanes> Crossing<L> {
         let (a, b) = (self, other);
         Self {
             t: a.t.or_else(mask, b.t),
+            slack: a.slack.or_else(mask, b.slack),
             edges: or_else3::<L>(a.edges, mask, b.edges),
             corners: or_else3::<L>(a.corners, mask, b.corners),
             inside: (a.inside & mask) | (b.inside & !mask),
@@ -377,7 +381,7 @@ fn one_side<L: Lanes>(e0: L::F, e1: L::F, e2: L::F) -> L::M {
 }
 
 #[inline(always)]
-fn cross<L: Lanes>(sheared: &Sheared<L>, ids: [u16; 3], active: L::M) -> Option<Crossing<L>> {
+fn cross<L: Lanes>(sheared: &Sheared<L>, ids: [u16; 3], active: L::M, t_max: L::F) -> Option<Crossing<L>> {
     // The remainder never does anything; it spares bounds checks.
     let [[ax, ay, at], [bx, by, bt], [cx, cy, ct]] = [
         sheared.at[ids[0] as usize % MOST_CORNERS],
@@ -398,7 +402,15 @@ fn cross<L: Lanes>(sheared: &Sheared<L>, ids: [u16; 3], active: L::M) -> Option<
     }
     let det = (e0 + e1) + e2;
     let t = ((e0 * at + e1 * bt) + e2 * ct) / det;
-    Some(Crossing { t, edges: [e0, e1, e2], corners: [at, bt, ct], inside: inside & t.gt(zero) })
+    let slack = at.abs().max(bt.abs()).max(ct.abs()) * L::F::splat(CLOSE);
+    let mut crossing = Crossing::<L> { t, slack, edges: [e0, e1, e2], corners: [at, bt, ct], inside };
+    let doubtful = inside & (t.abs().le(slack) | (t - t_max).abs().le(slack) | !t.is_finite());
+    crossing.inside = inside & t.gt(zero) & t.lt(t_max);
+    if doubtful.any() {
+        let exact = crossing.exact_hit().0;
+        crossing.inside = (crossing.inside & !doubtful) | (doubtful & exact.gt(zero) & exact.lt(t_max));
+    }
+    Some(crossing)
 }
 
 struct Intersect<'a> {
@@ -423,10 +435,11 @@ impl Kernel for Intersect<'_> {
             let mut best = Crossing::<L>::none(packet.t_max);
             let mut primitive = L::U::splat(MISS);
             for &(ids, index) in &front.big.triangles {
-                if let Some(c) = cross::<L>(&sheared, ids, packet.usable) {
+                if let Some(c) = cross::<L>(&sheared, ids, packet.usable, packet.t_max) {
                     // Strictly nearer: ties go to the lower index.
-                    let mut nearer = c.inside & c.t.lt(best.t);
-                    let close = best.inside & c.inside & (c.t - best.t).abs().le(best.t * L::F::splat(CLOSE));
+                    let mut nearer = c.inside & (c.t.lt(best.t) | !best.inside);
+                    let apart = (c.t - best.t).abs().gt(c.slack + best.slack);
+                    let close = best.inside & c.inside & !apart;
                     if close.any() {
                         nearer = (nearer & !close) | (close & c.exact_hit().0.lt(best.exact_hit().0));
                     }
@@ -479,8 +492,8 @@ impl Kernel for Occluded<'_> {
             packet.shear(&front.big, &mut sheared);
             let mut open = packet.usable;
             for &(ids, _) in &front.big.triangles {
-                if let Some(c) = cross::<L>(&sheared, ids, open) {
-                    open = open & !(c.inside & c.t.lt(packet.t_max));
+                if let Some(c) = cross::<L>(&sheared, ids, open, packet.t_max) {
+                    open = open & !c.inside;
                     if !open.any() {
                         break;
                     }

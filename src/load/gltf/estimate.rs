@@ -52,6 +52,9 @@ pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<Lo
     Some(LoadEstimate { bytes: json + kept + passing.max(pictures(&found)), left_over: text + left_over })
 }
 
+/// Bytes of an instance's name: the smallest piece that the allocator gives out.
+const NAME: u64 = 32;
+
 /// What the scene was found to reach so far.
 #[derive(Default)]
 struct Reached {
@@ -99,7 +102,7 @@ impl Survey<'_> {
             None => 1,
             Some(instancing) => self.accessor(*instancing.attributes.values().next()?)?.count,
         };
-        let placed = copies.saturating_mul(size_of::<Instance>() as u64 * mesh.primitives.len() as u64);
+        let placed = copies.saturating_mul((size_of::<Instance>() as u64 + NAME) * mesh.primitives.len() as u64);
         self.reached.kept = self.reached.kept.saturating_add(placed);
         let pose = (index, node.skin, node.weights.iter().map(|w| w.to_bits()).collect());
         if self.reached.meshes.insert(pose) {
