@@ -177,8 +177,8 @@ fn trace(name: &str, accel: &dyn Accel, rays: &RayBatch, n: usize) -> Vec<Found>
         MISS => (0, MISS, [hits.t[i].to_bits(), 0, 0]),
         p => (hits.instance[i], p, [hits.t[i], hits.u[i], hits.v[i]].map(f32::to_bits)),
     };
-    for i in 0..n {
-        assert_eq!(occluded[i], u8::from(hits.primitive[i] != MISS), "{name}: ray {i}: occluded is not intersect");
+    for (i, &occluded) in occluded.iter().enumerate() {
+        assert_eq!(occluded, u8::from(hits.primitive[i] != MISS), "{name}: ray {i}: occluded is not intersect");
         if name != "embree" {
             assert_eq!(of(&hits, i), of(&coherent, i), "{name}: ray {i}: the hint changes the hit");
         }

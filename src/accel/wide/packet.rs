@@ -3,7 +3,9 @@
 //! After Wald, Slusallek, Benthin and Wagner 2001, "Interactive Rendering with Coherent Ray Tracing". A packet's rays
 //! must share the signs of their directions and the largest component: lanes are traced in groups that do. Small groups,
 //! and batches whose rays part soon, are left to `traverse`. Handing single rays over in the middle of a packet, as
-//! Embree does, lost up to a third of the speed: each is set up again.
+//! Embree does, lost up to a third of the speed: each is set up again. Asking for the memory of children when they are
+//! pushed: 1.03 to 1.1 times the speed. Testing all children at once against the interval of the packet's rays first (as
+//! Embree does for coherent rays): 1.01 for camera rays, 0.95 for shadow rays; not kept.
 //!
 //! 38 Mray/s against 11 with single rays in a room of 910 triangles, but only 1.2 to 1.3 times as fast with 500 000
 //! triangles, where few rays of a packet share a leaf. Shadow rays to a lamp: 1.1 to 1.6 times as fast as single rays.
@@ -14,7 +16,7 @@ use super::leaf::{Asked, cross, sheared};
 use super::node::{Child, FILTERED, LEAF_ROWS, Leaves, WIDTH};
 use super::ray::{RayLanes, Shape, box_ends};
 use crate::accel::{HitBatch, MISS, RayBatch};
-use simd::{Float, Kernel, Lanes, Mask, Uint};
+use simd::{Float, Kernel, Lanes, Mask, Uint, prefetch};
 use std::ops::Range;
 
 /// Lanes at most.
@@ -59,8 +61,6 @@ struct Entry {
     /// Where each ray enters it; infinite for rays that do not.
     enter: [f32; MAX_LANES],
     child: Child,
-    /// Where the first of those that do enters it.
-    first: f32,
 }
 
 /// Nearest hits of `rays[range]` as far as packets find them; the others are `left`.
@@ -87,7 +87,7 @@ impl Kernel for IntersectPackets<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { bvh, rays, range, hits, left } = self;
-        let mut stack = [Entry { enter: [0.0; MAX_LANES], child: Child::inner(0), first: 0.0 }; STACK];
+        let mut stack = [Entry { enter: [0.0; MAX_LANES], child: Child::inner(0) }; STACK];
         let mut worth = Worth::default();
         let mut at = range.start;
         while at < range.end {
@@ -127,6 +127,17 @@ impl Kernel for IntersectPackets<'_> {
     }
 }
 
+/// Asks for the memory of what will be visited.
+#[inline(always)]
+fn ask_for(bvh: &WideBvh, child: Child) {
+    let tree = &bvh.world.tree;
+    if child.is_leaf() {
+        prefetch(&tree.leaves.data, Leaves::offset(child), 3);
+    } else if child.is_far() {
+        prefetch(&tree.nodes, child.node(), 4);
+    }
+}
+
 /// Appends the rays from `at` on that are in `lanes`.
 #[inline(always)]
 fn leave(left: &mut Vec<u32>, at: usize, mut lanes: u32) {
@@ -148,7 +159,7 @@ fn intersect_packet<L: Lanes>(
 ) {
     let shape = packet.shape(valid.trailing_zeros() as usize);
     let valid = L::M::from_bits(valid);
-    let nowhere = L::F::splat(-1.0);
+    let (nowhere, none) = (L::F::splat(-1.0), L::F::splat(f32::INFINITY));
     let mut end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
     let mut len = 1;
     stack[0].child = bvh.world.root;
@@ -168,24 +179,35 @@ fn intersect_packet<L: Lanes>(
             continue;
         }
         let node = &bvh.world.tree.nodes[child.node()];
-        let base = len;
+        // Sorted by where their first ray enters, farthest first, before the large entries are written.
+        let (mut entered, mut firsts, mut order) = ([none; WIDTH], [0.0; WIDTH], [0; WIDTH]);
+        let mut n = 0;
         for i in 0..node.count() {
+            let i = i % WIDTH;
             let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
             if bits == 0 {
                 continue;
             }
-            debug_assert!(len < STACK);
-            let entry = &mut stack[len % STACK];
-            enter.or_else(L::M::from_bits(bits), L::F::splat(f32::INFINITY)).store(&mut entry.enter, 0);
-            entry.child = node.child(i % WIDTH);
-            entry.first = entry.enter[bits.trailing_zeros() as usize % MAX_LANES];
-            // Sink it, so that the nearest ends on top.
-            let mut j = len;
-            len += 1;
-            while j > base && stack[(j - 1) % STACK].first < stack[j % STACK].first {
-                stack.swap((j - 1) % STACK, j % STACK);
+            entered[i] = enter.or_else(L::M::from_bits(bits), none);
+            let mut at = [0.0; MAX_LANES];
+            enter.store(&mut at, 0);
+            let first = at[bits.trailing_zeros() as usize % MAX_LANES];
+            firsts[i] = first;
+            let mut j = n % WIDTH;
+            n += 1;
+            while j > 0 && firsts[order[j - 1]] < first {
+                order[j] = order[j - 1];
                 j -= 1;
             }
+            order[j] = i;
+        }
+        for &i in &order[..n.min(WIDTH)] {
+            debug_assert!(len < STACK);
+            let entry = &mut stack[len % STACK];
+            entered[i].store(&mut entry.enter, 0);
+            entry.child = node.child(i);
+            ask_for(bvh, entry.child);
+            len += 1;
         }
     }
 }
@@ -264,7 +286,9 @@ fn occluded_packet<L: Lanes>(
             let bits = packet.test_box(&node.planes, i, shape.down, end).0 & active;
             if bits != 0 {
                 debug_assert!(len < STACK);
-                stack[len % STACK] = (node.child(i % WIDTH), bits);
+                let child = node.child(i % WIDTH);
+                ask_for(bvh, child);
+                stack[len % STACK] = (child, bits);
                 len += 1;
             }
         }
