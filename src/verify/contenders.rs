@@ -1,4 +1,4 @@
-//! Every backend, in every way that pictures use it, and what each can trace so far.
+//! Every backend, in every way that pictures use it.
 
 use super::rays::{Kind, Ray, batch};
 use crate::accel::embree::{self, EmbreeAccel};
@@ -27,39 +27,6 @@ pub enum Backend {
 /// Brute force looks at no more triangles than this.
 const LINEAR_MOST: usize = 1000;
 
-/// What a geometry asks of a backend.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Needs {
-    placements: bool,
-    motion: bool,
-    filter: bool,
-    shapes: bool,
-}
-
-impl Needs {
-    fn of(geometry: &Geometry) -> Self {
-        let objects = || std::iter::once(&geometry.world).chain(&geometry.objects);
-        let parts = || objects().flat_map(|o: &Object| &o.parts);
-        Self {
-            placements: !geometry.placements.is_empty(),
-            motion: parts().any(|p| p.keys() > 1) || geometry.placements.iter().any(|p| p.moves()),
-            filter: parts().any(|p| p.filtered),
-            shapes: objects().any(|o| !o.shapes.is_empty()),
-        }
-    }
-
-    /// The first that `able` lacks.
-    fn beyond(self, able: Self) -> Option<&'static str> {
-        let lacks = [
-            ("instances", self.placements && !able.placements),
-            ("motion", self.motion && !able.motion),
-            ("partly present surfaces", self.filter && !able.filter),
-            ("exact shapes", self.shapes && !able.shapes),
-        ];
-        lacks.into_iter().find(|(_, lacks)| *lacks).map(|(name, _)| name)
-    }
-}
-
 impl Backend {
     /// Its name.
     pub fn name(self) -> &'static str {
@@ -67,15 +34,6 @@ impl Backend {
             Self::Bvh => "bvh",
             Self::Embree => "embree",
             Self::Linear => "linear",
-        }
-    }
-
-    /// What it can trace. THE place to change when a backend learns something.
-    fn able(self) -> Needs {
-        match self {
-            Self::Bvh | Self::Embree | Self::Linear => {
-                Needs { placements: true, motion: true, filter: true, shapes: true }
-            }
         }
     }
 }
@@ -139,12 +97,7 @@ pub fn contenders(
     embree_dirs: &[PathBuf],
 ) -> Result<(Vec<Contender>, Vec<LeftOut>), RenderError> {
     let (mut all, mut left_out) = (Vec::new(), Vec::new());
-    let needs = Needs::of(geometry);
     for &backend in backends {
-        if let Some(lack) = needs.beyond(backend.able()) {
-            left_out.push((backend, format!("{lack} are not built for it")));
-            continue;
-        }
         if backend == Backend::Linear {
             let traced = traced_triangles(geometry);
             if traced > LINEAR_MOST {
