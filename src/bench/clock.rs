@@ -5,7 +5,7 @@
 
 use std::time::Instant;
 
-/// What [`Clock`] measures here: `thread CPU`, or `wall` where the system tells no thread's CPU time.
+/// What `Clock` measures here: `thread CPU`, or `wall` where the system tells no thread's CPU time.
 pub const KIND: &str = if cfg!(unix) { "thread CPU" } else { "wall" };
 
 /// A moment of the calling thread. Only to be read by the thread that made it.
