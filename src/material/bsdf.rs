@@ -8,6 +8,7 @@
 //! D is evaluated from the half vector's x, y, z: the textbook form `((n.h)^2 (a^2 - 1) + 1)^2` loses 12 % at alpha =
 //! 0.001 in f32, this one 7e-7.
 
+use super::surface::Surface;
 use crate::math::lanes::{cos_sin_2pi, pow5, safe_sqrt};
 use crate::math::{Frame, V3};
 use simd::{Float, Lanes, Mask};
@@ -69,38 +70,43 @@ pub struct BsdfSample<L: Lanes> {
     pub pdf: L::F,
     /// Lanes that have a direction at all.
     pub valid: L::M,
+    /// Lanes whose direction leads to the other side of the surface.
+    pub transmitted: L::M,
+    /// Lanes that go on as they came, through a thin-walled surface of roughness 0: no scattering, light from there was
+    /// sampled before (see [`Bsdf::straight`]).
+    pub straight: L::M,
 }
 
-/// Texture-free parameters of the surface at a hit.
-pub struct Surface<L: Lanes> {
-    /// Linear, in [0, 1].
-    pub base: V3<L>,
-    /// In [0, 1].
-    pub metallic: L::F,
-    /// Perceptual, in [0, 1].
-    pub roughness: L::F,
-    /// `specularFactor`, in [0, 1].
-    pub specular: L::F,
-    /// Dielectric reflectance at normal incidence with its colour, in [0, 1].
-    pub f0: V3<L>,
+/// From where a surface is seen.
+pub struct View<L: Lanes> {
+    /// About the shading normal on the viewer's side; x along the tangent in lanes with anisotropy.
+    pub frame: Frame<L>,
+    /// About the coat's normal on the viewer's side; `None`: the same.
+    pub coat_frame: Option<Frame<L>>,
+    /// Towards the viewer, world space, unit.
+    pub wo: V3<L>,
+    /// Index of refraction behind the surface over that before it, as seen by the viewer; read at the boundaries of
+    /// volumes only. 1: there is no boundary.
+    pub eta: L::F,
 }
 
-impl<L: Lanes> Surface<L> {
-    /// The lanes that have more than the diffuse lobe.
+impl<L: Lanes> View<L> {
+    /// Of an uncoated surface that is no boundary.
     #[inline(always)]
-    pub fn has_specular(&self) -> L::M {
-        self.metallic.gt(L::F::zero()) | self.specular.gt(L::F::zero())
+    pub fn new(frame: Frame<L>, wo: V3<L>) -> Self {
+        Self { frame, coat_frame: None, wo, eta: L::F::one() }
     }
 }
 
 impl<L: Lanes> Bsdf<L> {
-    /// The closure for a surface seen from world direction `wo`. Where `wo . frame.z` is not positive, a surface with a
-    /// specular lobe reflects nothing.
+    /// The closure for a surface seen so. Where `wo . frame.z` is not positive, a surface with a specular lobe reflects
+    /// nothing.
     #[inline(always)]
-    pub fn new(surface: Surface<L>, frame: Frame<L>, wo: V3<L>) -> Self {
+    pub fn new(surface: Surface<L>, view: View<L>) -> Self {
+        let View { frame, coat_frame: _, wo, eta: _ } = view;
         let (zero, one) = (L::F::zero(), L::F::one());
         let has_specular = surface.has_specular();
-        let Surface { base, metallic, roughness, specular, f0 } = surface;
+        let Surface { base, metallic, roughness, specular, f0, extras: _ } = surface;
         let alpha = roughness * roughness;
         let wo = frame.to_local(wo);
         let is_diffuse = !has_specular;
@@ -226,6 +232,14 @@ impl<L: Lanes> Bsdf<L> {
         self.eval_local(self.frame.to_local(wi))
     }
 
+    /// Share of light, per colour, that goes straight through a thin-walled surface of roughness 0, whatever [`Bsdf::eval`]
+    /// says besides: what a shadow ray keeps of its light, and what [`Bsdf::sample`] gives on average to rays that go on
+    /// as they came. 0 for all other surfaces.
+    #[inline(always)]
+    pub fn straight(&self) -> V3<L> {
+        V3::zero()
+    }
+
     /// A direction from the mixture of both lobes, by `u` (direction) and `u_lobe`.
     #[inline(always)]
     pub fn sample(&self, u: [L::F; 2], u_lobe: L::F) -> BsdfSample<L> {
@@ -242,6 +256,8 @@ impl<L: Lanes> Bsdf<L> {
                 weight: albedo,
                 pdf: wi.z * L::F::splat(FRAC_1_PI),
                 valid: wi.z.gt(zero),
+                transmitted: L::M::from_bits(0),
+                straight: L::M::from_bits(0),
             };
         }
         let from_specular = u_lobe.lt(self.specular_pmf);
@@ -273,6 +289,8 @@ impl<L: Lanes> Bsdf<L> {
             pdf: L::F::splat(f32::INFINITY).or_else(mirror, value.pdf),
             // A specular sample below its horizon is lost, even where the diffuse lobe reaches.
             valid: (wi.z.gt(zero) | !from_specular) & self.is_seen & (mirror | value.pdf.gt(zero)),
+            transmitted: L::M::from_bits(0),
+            straight: L::M::from_bits(0),
         }
     }
 }

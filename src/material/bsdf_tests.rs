@@ -28,9 +28,10 @@ fn bsdf<L: Lanes>([base, metallic, roughness, specular]: [f32; 4], cos: f32) -> 
         roughness: f(roughness),
         specular: f(specular),
         f0: V3::<L>::splat([0.04; 3]),
+        extras: None,
     };
     let wo = V3::<L>::splat([(1.0 - cos * cos).sqrt(), 0.0, cos]);
-    Bsdf::new(surface, Frame::around(V3::splat([0.0, 0.0, 1.0])), wo)
+    Bsdf::new(surface, View::new(Frame::around(V3::splat([0.0, 0.0, 1.0])), wo))
 }
 
 /// The first lane.

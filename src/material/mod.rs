@@ -2,9 +2,12 @@
 
 pub mod bsdf;
 mod bump;
+pub mod extensions;
+pub mod surface;
 pub mod table;
 
 use crate::texture::{Channels, Param, TextureRef};
+use extensions::{Anisotropy, Clearcoat, DiffuseTransmission, Disney, Iridescence, Sheen, Transmission, Volume};
 
 /// What is seen through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,8 +23,7 @@ pub enum AlphaMode {
     Blend,
 }
 
-/// Metallic-roughness parameters with `KHR_materials_specular`, `KHR_materials_ior`, `KHR_materials_unlit` and
-/// `KHR_materials_emissive_strength`.
+/// Metallic-roughness parameters and those of the `KHR_materials_*` extensions. A feature with a factor of 0 is absent.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// For messages.
@@ -48,6 +50,25 @@ pub struct Material {
     pub specular_color: Param<[f32; 3]>,
     /// Index of refraction, >= 1, or 0: fully reflecting (`KHR_materials_ior`).
     pub ior: f32,
+    /// Coat over everything else (`KHR_materials_clearcoat`).
+    pub clearcoat: Clearcoat,
+    /// Fuzz over everything but the coat (`KHR_materials_sheen`).
+    pub sheen: Sheen,
+    /// Stretched highlights (`KHR_materials_anisotropy`).
+    pub anisotropy: Anisotropy,
+    /// Thin film on the specular layer and the metal (`KHR_materials_iridescence`).
+    pub iridescence: Iridescence,
+    /// Specular transmission (`KHR_materials_transmission`, `_dispersion`).
+    pub transmission: Transmission,
+    /// What is inside, if the surface is the boundary of something (`KHR_materials_volume`); `None` = thin-walled.
+    pub volume: Option<Volume>,
+    /// Light that comes through diffusely (`KHR_materials_diffuse_transmission`).
+    pub diffuse_transmission: DiffuseTransmission,
+    /// The Disney BRDF of 2012 in place of all of these but base colour, metallic and roughness (`prt_disney`).
+    pub disney: Option<Disney>,
+    /// `KHR_materials_pbrSpecularGlossiness`: `base_color` is the diffuse colour, `specular_color` the reflectance at
+    /// normal incidence with `ior` 0, `roughness` one minus the glossiness; their texture's alpha is the glossiness.
+    pub specular_glossiness: bool,
     /// Shows its base colour as it is to camera and mirror rays, neither lit nor lighting anything.
     pub unlit: bool,
     /// Both sides emit. (Both sides are always seen; single-sided surfaces emit on their front only.)
@@ -109,6 +130,15 @@ impl Default for Material {
             specular: Param::constant(1.0),
             specular_color: Param::constant([1.0; 3]),
             ior: 1.5,
+            clearcoat: Clearcoat::default(),
+            sheen: Sheen::default(),
+            anisotropy: Anisotropy::default(),
+            iridescence: Iridescence::default(),
+            transmission: Transmission::default(),
+            volume: None,
+            diffuse_transmission: DiffuseTransmission::default(),
+            disney: None,
+            specular_glossiness: false,
             unlit: false,
             double_sided: false,
         }

@@ -1,6 +1,6 @@
 //! Materials as shading reads them, and their textures applied.
 
-use super::bsdf::Surface;
+use super::surface::Surface;
 use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
 use crate::texture::TextureRef;
@@ -208,8 +208,14 @@ impl MaterialTable {
         let [r, g, b, _] = self.record::<L>(material, 0);
         let [metallic, roughness, specular, _] = self.record::<L>(material, 1);
         let [f0r, f0g, f0b, _] = self.record::<L>(material, 2);
-        let mut s =
-            Surface { base: V3::<L>::new(r, g, b), metallic, roughness, specular, f0: V3::<L>::new(f0r, f0g, f0b) };
+        let mut s = Surface {
+            base: V3::<L>::new(r, g, b),
+            metallic,
+            roughness,
+            specular,
+            f0: V3::<L>::new(f0r, f0g, f0b),
+            extras: None,
+        };
         if self.is_textured {
             let none = L::U::splat(NO_TEXTURE);
             let [base, rough, _, spec] = self.record::<L>(material, 4);
