@@ -3,6 +3,7 @@
 pub mod bsdf;
 mod bump;
 pub mod extensions;
+pub mod media;
 pub mod surface;
 pub mod table;
 
