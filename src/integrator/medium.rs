@@ -163,6 +163,13 @@ impl<L: Lanes> Crossing<L> {
         tables.media.transmittance_from_far(medium).or_else(is_distant, near)
     }
 
+    /// By how much radiance is denser than in air where the path goes on: behind the surface in `through`.
+    #[inline(always)]
+    pub fn density(&self, media: &MediumTable, through: L::M) -> L::F {
+        let ior = media.ior::<L>(self.behind.or_else(through, self.before));
+        ior * ior
+    }
+
     /// `beta` after going on behind the surface in `through`: paths that take a wavelength get its colour.
     #[inline(always)]
     pub fn colored(&self, beta: V3<L>, through: L::M) -> V3<L> {

@@ -169,7 +169,12 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     // diffuse interiors.
     let rolls = alive & !straight & !depth.lt(L::U::splat(ROULETTE_DEPTH - 1));
     if rolls.any() {
-        let survival = brightest.sqrt().min(L::F::one());
+        // Radiance is denser in a denser medium, by the square of its index; the path is worth the same.
+        let worth = match &crossing {
+            Some(crossing) => brightest * crossing.density(&tables.media, through),
+            None => brightest,
+        };
+        let survival = worth.sqrt().min(L::F::one());
         alive = alive & (!rolls | u[3].lt(survival));
         beta = beta.scale(L::F::one() / survival).or_else(rolls, beta);
     }
