@@ -178,3 +178,7 @@ fn bump_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L
 fn corner_uvs<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, b: [L::F; 2]) -> UvSets<L> {
     tables.triangles.attributes::<L>(si.triangle.attributes, b[0], b[1]).uvs
 }
+
+#[cfg(test)]
+#[path = "normals_tests.rs"]
+mod tests;

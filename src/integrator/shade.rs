@@ -9,8 +9,8 @@ use super::{PathTracer, SceneTables};
 use crate::accel::MISS;
 use crate::material::bsdf::Bsdf;
 use crate::material::surface::Surface;
-use crate::math::bend::let_mirror_leave;
 use crate::math::V3;
+use crate::math::bend::let_mirror_leave;
 use crate::sampler::{Key, coverage_key, dims};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
 

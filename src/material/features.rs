@@ -76,7 +76,8 @@ impl Material {
 
     /// Whether shading depends on the direction of tangents.
     pub fn needs_tangents(&self) -> bool {
-        let is_stretched = self.has_anisotropy() || self.is_disney() && self.disney.is_some_and(|d| d.anisotropic > 0.0);
+        let is_stretched =
+            self.has_anisotropy() || self.is_disney() && self.disney.is_some_and(|d| d.anisotropic > 0.0);
         is_stretched || self.tangent_map().is_some()
     }
 

@@ -1,10 +1,10 @@
 //! One primitive: its attributes, deformed by morph targets and skin, as a [`Mesh`].
 
 use super::accessor::{self, Elements};
+use super::material::Along;
 use super::semantic::{INDICES, NORMAL, POSITION, TANGENT, Wanted};
 use super::skin::Palette;
 use super::topology::{Topology, topology};
-use super::material::Along;
 use super::{Loader, Result, extensions, material, morph, variants};
 use crate::load::tangents;
 use crate::shape::Mesh;

@@ -59,9 +59,8 @@ pub(super) fn reads(material: &Material) -> Vec<(Read, Channels)> {
 
 /// Whether meshes with this material need tangents.
 pub(super) fn needs_tangents(material: &Material) -> bool {
-    let on = |extension: &str, factor: &str| {
-        material.extensions.others.get(extension).filter(|found| is_on(found, factor))
-    };
+    let on =
+        |extension: &str, factor: &str| material.extensions.others.get(extension).filter(|found| is_on(found, factor));
     let is_coat_mapped = on(COAT, "clearcoatFactor").is_some_and(|coat| coat.get("clearcoatNormalTexture").is_some());
     let is_disney = is_on(&material.extras, "prt_disney") || material.extras["prt_disney"] == true;
     let is_stretched =

@@ -448,4 +448,3 @@ struct At<'a, L: Lanes> {
     place: L::U,
     uvs: &'a UvSets<L>,
 }
-

@@ -75,7 +75,9 @@ impl Reader<'_, '_> {
             None => Ok(false),
             Some(Some(1.0)) => Ok(true),
             Some(Some(0.0)) => Ok(false),
-            Some(_) => Err(self.bad(&object.place(SWITCH), "is neither on nor off", "Allowed: 1, or 0 (as without it).")),
+            Some(_) => {
+                Err(self.bad(&object.place(SWITCH), "is neither on nor off", "Allowed: 1, or 0 (as without it)."))
+            }
         }
     }
 }

@@ -77,7 +77,8 @@ impl Reader<'_, '_> {
         let factor = self.share(&object, "iridescenceFactor", absent.factor.factor)?;
         let ior = self.number(&object, "iridescenceIor", absent.ior)?;
         let hint = "1 is a film that reflects nothing itself; soap water 1.33.";
-        let [ior] = self.within(&object.place("iridescenceIor"), [ior], 1.0..=f32::MAX, "at least 1 and finite", hint)?;
+        let [ior] =
+            self.within(&object.place("iridescenceIor"), [ior], 1.0..=f32::MAX, "at least 1 and finite", hint)?;
         let thickness = |key: &str, absent: f32| {
             let value = self.number(&object, key, absent)?;
             self.positive(&object.place(key), [value]).map(|[v]| v)

@@ -107,15 +107,18 @@ impl Reader<'_, '_> {
         let mut material = Material { name, double_sided: found.double_sided, ..Material::default() };
         material.unlit = found.extensions.as_ref().is_some_and(|e| e.others.contains_key(UNLIT));
         material.disney = self.disney(found)?;
-        if !self.specular_glossiness(found, &mut material)? {
+        let is_glossy = self.specular_glossiness(found, &mut material)?;
+        if !is_glossy {
             self.base(found, &mut material)?;
             self.metallic_roughness(found, &mut material)?;
+        }
+        self.normal(found, &mut material)?;
+        self.emission(found, &mut material)?;
+        if !is_glossy {
             self.specular(found, &mut material)?;
             material.ior = self.ior(found)?;
             self.transmission(found, &mut material)?;
         }
-        self.normal(found, &mut material)?;
-        self.emission(found, &mut material)?;
         self.clearcoat(found, &mut material)?;
         self.sheen(found, &mut material)?;
         self.anisotropy(found, &mut material)?;

@@ -1,9 +1,9 @@
 //! `KHR_materials_pbrSpecularGlossiness`, the model before metallic-roughness; archived, and still in many files.
 
+use super::Reader;
 use super::core::{IOR, SPECULAR};
 use super::glass::TRANSMISSION;
 use super::object::Object;
-use super::Reader;
 use crate::load::gltf::Result;
 use crate::load::gltf::texture_info::Info;
 use crate::material::Material;
