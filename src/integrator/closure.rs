@@ -2,11 +2,11 @@
 
 use super::SceneTables;
 use super::interaction::Interaction;
-use super::normals::shading_normal;
+use super::normals::{shading_normal, view};
 use crate::material::bsdf::{Bsdf, View};
 use crate::material::surface::Surface;
+use crate::math::V3;
 use crate::math::bend::let_mirror_leave;
-use crate::math::{Frame, V3};
 use simd::{Float, Lanes, Mask};
 
 /// A surface at a hit, all but directions known.
@@ -37,13 +37,15 @@ pub(super) fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, eta: 
         None => L::M::from_bits(0),
     };
     let bsdf = if !tables.has_shading_normals() {
-        Bsdf::new(surface, View { eta, ..View::new(Frame::around(si.ng), si.wo) })
+        let view = View { eta, ..view(tables, si, &surface, si.ng, active) };
+        Bsdf::new(surface, view)
     } else {
         let ns = shading_normal(tables, si, active);
         // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
         let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
         let low = low & active & surface.has_specular();
-        let bsdf = Bsdf::new(surface, View { eta, ..View::new(Frame::around(bent.or_else(low, ns)), si.wo) });
+        let view = View { eta, ..view(tables, si, &surface, bent.or_else(low, ns), active) };
+        let bsdf = Bsdf::new(surface, view);
         if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
     };
     Closure { bsdf, transmits }

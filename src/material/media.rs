@@ -15,8 +15,6 @@ const BOUNDARY: u32 = 1;
 /// The surface has no inside and may be so smooth that light goes straight through it.
 const THIN: u32 = 2;
 
-/// Absorption that lets nothing through, 1/m: a millionth of a micrometre takes all, and its product with 0 m is 0.
-const BLACK: f32 = 1e30;
 /// Index of refraction of what reflects everything (`ior` 0).
 const REFLECTING: f32 = 1e9;
 
@@ -59,23 +57,19 @@ impl MediumTable {
     }
 
     fn push(&mut self, m: &Material) {
-        let is_shaded = !m.unlit && m.disney.is_none();
-        let refracts = is_shaded && m.transmission.factor.factor > 0.0;
-        let transmits = refracts || (is_shaded && m.diffuse_transmission.factor.factor > 0.0);
-        let volume = m.volume.filter(|_| transmits);
-        let is_thin = refracts && volume.is_none() && may_be_smooth(m);
+        let interior = m.interior();
+        let is_thin = m.has_transmission() && interior.is_none() && may_be_smooth(m);
         let ior = if m.ior == 0.0 { REFLECTING } else { m.ior };
-        let dispersion =
-            if refracts && volume.is_some() && m.ior != 0.0 { m.transmission.dispersion.max(0.0) } else { 0.0 };
-        let [r, g, b] = volume.map_or([0.0; 3], |v| absorption(v.attenuation_color, v.attenuation_distance));
-        let flags = if volume.is_some() { BOUNDARY } else { 0 } | if is_thin { THIN } else { 0 };
+        let dispersion = if m.has_dispersion() && m.ior != 0.0 { m.transmission.dispersion } else { 0.0 };
+        let [r, g, b] = interior.map_or([0.0; 3], |volume| volume.absorption());
+        let flags = if interior.is_some() { BOUNDARY } else { 0 } | if is_thin { THIN } else { 0 };
         // KHR_materials_dispersion: Abbe's number is 20 / dispersion.
         let spread = (ior - 1.0) * dispersion / 20.0;
         self.records.extend([[r, g, b, f32::from_bits(flags)], [ior, spread, 0.0, 0.0]]);
-        self.has_volume |= volume.is_some();
+        self.has_volume |= interior.is_some();
         self.has_thin_glass |= is_thin;
         self.has_dispersion |= spread > 0.0;
-        self.transmits |= transmits;
+        self.transmits |= m.has_transmission() || m.has_diffuse_transmission();
     }
 
     /// Whether any surface is the boundary of something that light gets into.
@@ -168,16 +162,6 @@ const LINE_SCALE: f32 = LINE_SCALE_F64 as f32;
 fn may_be_smooth(m: &Material) -> bool {
     let alpha = m.roughness.factor * m.roughness.factor;
     alpha < DELTA_ALPHA || m.roughness.texture.is_some()
-}
-
-/// Absorption, 1/m, of which `color` (in [0, 1]) is left after `distance` metres (> 0, may be infinite).
-fn absorption(color: [f32; 3], distance: f32) -> [f32; 3] {
-    color.map(|c| {
-        let depth = -f64::from(c.clamp(0.0, 1.0)).ln();
-        let absorption = depth / f64::from(distance.max(0.0));
-        // 0 / 0 is of what absorbs nothing over no distance.
-        if absorption.is_nan() { 0.0 } else { (absorption as f32).min(BLACK) }
-    })
 }
 
 #[cfg(test)]

@@ -29,10 +29,7 @@ pub(super) fn lights_that_glass_hides(scene: &Scene) -> Option<String> {
 
 /// Whether light comes through `m` in other directions than straight on.
 fn bends(m: &Material) -> bool {
-    if m.unlit || m.disney.is_some() || m.transmission.factor.factor <= 0.0 {
-        return false;
-    }
-    m.volume.is_some() || m.roughness.factor > 0.0
+    m.has_transmission() && (m.interior().is_some() || m.roughness.factor > 0.0)
 }
 
 fn shines(light: &Light) -> bool {
