@@ -129,7 +129,7 @@ fn through_layers(mu: f64, indices: &[f64]) -> f64 {
     let mut all = vec![1.0];
     all.extend(indices);
     all.push(1.0);
-    let reflected = all.windows(2).fold(0.0, |r, pair| {
+    let reflected = all.windows(2).fold(0.0_f64, |r, pair| {
         let f = fresnel(bent(mu, pair[0]), pair[1] / pair[0]);
         r + (1.0 - r).powi(2) * f / (1.0 - r * f)
     });
