@@ -3,6 +3,7 @@
 pub mod bsdf;
 mod bump;
 pub mod extensions;
+pub mod lobes;
 pub mod surface;
 pub mod table;
 
