@@ -38,6 +38,8 @@ pub struct ChiSquare {
     pub p_value: f64,
     /// Integral of the density over the domain.
     pub integral: f64,
+    /// How many directions were asked for.
+    pub samples: usize,
     /// Share of the samples that are directions with a density, within the domain.
     pub sampled: f64,
     /// Share of the samples where the density is 0. More than 1e-5 is a fault that pooling would hide.
@@ -47,9 +49,12 @@ pub struct ChiSquare {
 }
 
 impl ChiSquare {
-    /// Not so unlikely, at the probability `level` of a false alarm.
+    /// Not so unlikely, at the probability `level` of a false alarm; and the integral is what is sampled within 1e-3 and
+    /// five standard deviations: a density that is too great everywhere is spread thin over the cells.
     pub fn passes(&self, level: f64) -> bool {
-        self.p_value >= level && self.impossible <= 1e-5 && self.integral.is_finite()
+        let deviation = (self.sampled * (1.0 - self.sampled) / self.samples as f64).sqrt();
+        let is_whole = (self.integral - self.sampled).abs() <= 1e-3 + 5.0 * deviation;
+        self.p_value >= level && self.impossible <= 1e-5 && is_whole
     }
 }
 
@@ -83,6 +88,7 @@ pub fn chi_square(scatterer: &dyn Scatterer, wo: [f32; 3], domain: Domain, setti
         dof,
         p_value: chi_square_tail(statistic, dof),
         integral,
+        samples,
         sampled: 1.0 - elsewhere / samples as f64,
         impossible: impossible as f64 / samples as f64,
         albedo,
