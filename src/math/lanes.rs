@@ -173,6 +173,20 @@ pub fn pow5<F: Float>(v: F) -> F {
     v2 * v2 * v
 }
 
+/// `e^x`, relative error below 2e-7; 0 below -87, the largest of them above 88, 0 for NaN.
+#[inline(always)]
+pub fn exp<L: Lanes>(x: L::F) -> L::F {
+    let f = |v: f32| L::F::splat(v);
+    let x = x.max(f(-88.0)).min(f(88.0));
+    // x = n ln 2 + r with |r| <= ln 2 / 2, ln 2 in two parts.
+    let n = (x * f(std::f32::consts::LOG2_E) + f(0.5)).floor();
+    let r = n.mul_add(f(1.428_606_8e-6), n.mul_add(f(-0.693_148_6), x));
+    let tail = r.mul_add(r.mul_add(f(1.0 / 720.0), f(1.0 / 120.0)), f(1.0 / 24.0));
+    let p = r.mul_add(r.mul_add(r.mul_add(r.mul_add(tail, f(1.0 / 6.0)), f(0.5)), f(1.0)), f(1.0));
+    let power = (n + f(127.0)).max(f(0.0)).to_uint().shl(23).to_float_bits();
+    p * power
+}
+
 /// (cos 2 pi u, sin 2 pi u) for u in [0, 1], absolute error below 3e-7.
 ///
 /// The octant is folded away exactly, then Taylor polynomials in `[-pi/4, pi/4]`.
@@ -207,6 +221,31 @@ pub(crate) mod tests {
                 dispatch(level, kernel.clone());
             }
         }
+    }
+
+    #[test]
+    fn exp_is_that_of_f64() {
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                for i in -8600..8800 {
+                    let x = i as f32 * 0.01;
+                    let found = f64::from(exp::<L>(L::F::splat(x)).first());
+                    let exact = f64::from(x).exp();
+                    assert!((found / exact - 1.0).abs() < 2e-7, "e^{x}: {found}, f64 {exact}");
+                }
+                assert_eq!(exp::<L>(L::F::splat(0.0)).first(), 1.0);
+                for x in [-89.0, -1e30, f32::NEG_INFINITY, f32::NAN] {
+                    assert_eq!(exp::<L>(L::F::splat(x)).first(), 0.0, "e^{x}");
+                }
+                assert!(exp::<L>(L::F::splat(f32::INFINITY)).first().is_finite());
+            }
+        }
+        at_all_levels(Check);
     }
 
     #[test]
