@@ -108,7 +108,11 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
 
     if tables.materials.is_emissive() {
-        let le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, &si.uvs, hit);
+        let mut le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, &si.uvs, hit);
+        if tables.materials.has_coat() {
+            let (material, cos) = (si.triangle.material, si.wo.dot(si.ng));
+            le = le.scale(tables.materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, hit));
+        }
         let lit = hit & le.max_component().gt(L::F::zero());
         if lit.any() {
             // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray

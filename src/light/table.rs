@@ -316,6 +316,10 @@ impl LightTable {
         let finite = pdf.is_finite() & pdf.gt(L::F::zero());
         let material = record[3][3].to_bits();
         let mut radiance: V3<L> = materials.emission(textures, material, front, &uvs, finite);
+        if materials.has_coat() {
+            radiance =
+                radiance.scale(materials.emission_through_coat::<L>(textures, material, cos.abs(), &uvs, finite));
+        }
         if materials.has_alpha() {
             // The ray ends before the light's own surface, so what of it is not there is taken off here.
             radiance = radiance.scale(materials.coverage(textures, material, &uvs, vertex_opacity, finite));

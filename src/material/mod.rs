@@ -4,6 +4,7 @@ pub mod bsdf;
 mod bump;
 pub mod extensions;
 mod features;
+pub mod lobes;
 pub mod media;
 pub mod surface;
 pub mod table;

@@ -3,6 +3,7 @@
 use super::{EXTRAS_SHIFT, MaterialTable, tangent_normal, texel};
 use crate::material::Material;
 use crate::material::extensions::Iridescence;
+use crate::material::lobes::fresnel::dielectric;
 use crate::material::surface::{DisneyExtras, Extras};
 use crate::math::lanes::lerp;
 use crate::math::{UvSets, V3};
@@ -10,6 +11,9 @@ use crate::texture::lookup::{Encoding, TextureTable};
 use simd::{Float, Lanes, Mask, Uint};
 
 const RECORDS: u32 = 11;
+
+/// `KHR_materials_clearcoat`: index of refraction of the coat.
+const COAT_IOR: f32 = 1.5;
 
 // Flags of a material; those of a scene are all of its materials' together.
 const COAT: u32 = 1;
@@ -326,6 +330,30 @@ impl MaterialTable {
             });
         }
         Some(extras)
+    }
+
+    /// Share of a surface's own light that gets through its coat, seen at the cosine `cos` (> 0) to the geometric normal
+    /// (`KHR_materials_clearcoat`: the coat lies over emission too); exactly 1 where there is no coat.
+    #[inline(always)]
+    pub fn emission_through_coat<L: Lanes>(
+        &self,
+        textures: &TextureTable,
+        material: L::U,
+        cos: L::F,
+        uvs: &UvSets<L>,
+        active: L::M,
+    ) -> L::F {
+        let one = L::F::one();
+        let (flags, place) = self.features::<L>(material);
+        let lanes = active & flags.has(COAT);
+        if !lanes.any() {
+            return one;
+        }
+        let [mut coat, _, texture, _] = self.extras.record::<L>(place, 0);
+        if let Some((t, has)) = texel::<L>(textures, texture, uvs, lanes, Encoding::Linear) {
+            coat = (coat * t.rgb.x).or_else(has, coat);
+        }
+        (one - coat * dielectric::<L>(cos, L::F::splat(COAT_IOR))).or_else(lanes, one)
     }
 
     #[inline(always)]
