@@ -1,8 +1,13 @@
 //! Materials as described by the file, in glTF's names.
 
+mod base;
 pub mod bsdf;
 mod bump;
+pub mod energy;
 pub mod extensions;
+mod film;
+pub mod layered;
+mod lobes;
 pub mod surface;
 pub mod table;
 

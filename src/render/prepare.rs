@@ -164,7 +164,7 @@ fn prepare_all(
     }
     let (bounds, origin) = (boxes.scene, boxes.origin());
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
-    let materials = MaterialTable::new(&scene.materials, &mut textures);
+    let materials = MaterialTable::new(&scene.materials, &mut textures, settings.brdf);
     let mut triangles = TriangleTable::with_capacity(count as usize);
     let mut parts = Parts::default();
     let mut lights = Vec::new();

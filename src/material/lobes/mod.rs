@@ -1,0 +1,9 @@
+//! Lobes on their own: local directions in, value and density out. `bsdf` puts them together.
+//!
+//! `ggx` and `fresnel` are the parts that several lobes share.
+//!
+//! All directions are local, unit, z along the normal, and point away from the surface. A lane without a lobe has value 0,
+//! density 0, albedo 0, and scales what lies below by exactly 1.
+
+pub mod fresnel;
+pub mod ggx;
