@@ -133,10 +133,11 @@ fn rays(mesh: &Triangles, n: usize, rng: &mut Rng) -> Vec<Ray> {
 fn bvh01_diagonal_beams_with_splits_are_hit_as_by_brute_force() {
     let mut rng = Rng::new(41);
     let mesh = timber(&mut rng);
-    for (s, shift) in [(1.0, Vec3::ZERO), (1e-6, Vec3::ZERO), (1e6, Vec3::ZERO), (1.0, Vec3::new(1234.0, -99.0, 517.0))] {
+    for (s, shift) in [(1.0, Vec3::ZERO), (1e-6, Vec3::ZERO), (1e6, Vec3::ZERO), (1.0, Vec3::new(1234.0, -99.0, 517.0))]
+    {
         let mesh = meshes::placed(&mesh, s, shift);
-        let hits = agreed(&format!("s {s}, T {shift}"), &mesh, 0.4, &rays(&mesh, 4000, &mut rng));
-        assert!(hits.iter().filter(|hit| hit.0 != MISS).count() > 1500);
+        let hits = agreed(&format!("s {s}, T {shift}"), &mesh, 0.4, &rays(&mesh, 2000, &mut rng));
+        assert!(hits.iter().filter(|hit| hit.0 != MISS).count() > 700);
     }
 }
 
@@ -144,16 +145,16 @@ fn bvh01_diagonal_beams_with_splits_are_hit_as_by_brute_force() {
 fn bvh01_soups_and_slivers_with_splits_are_hit_as_by_brute_force() {
     let mut rng = Rng::new(42);
     let soup = random_soup(400, 0.8, 1.0, Vec3::ZERO, &mut rng);
-    agreed("soup", &soup, 0.2, &rays(&soup, 6000, &mut rng));
+    agreed("soup", &soup, 0.2, &rays(&soup, 3000, &mut rng));
     let slivers = slivers(400, 1e-2, &mut rng);
-    agreed("slivers", &slivers, 0.3, &rays(&slivers, 6000, &mut rng));
+    agreed("slivers", &slivers, 0.3, &rays(&slivers, 3000, &mut rng));
 }
 
 #[test]
 fn geo01_no_ray_leaves_a_closed_mesh_of_spikes_with_splits() {
     let mut rng = Rng::new(43);
     let mesh = sphere(16, 16, || if rng.below(3) == 0 { 30.0 } else { 1.0 + rng.unit() });
-    let rays: Vec<Ray> = (0..9000)
+    let rays: Vec<Ray> = (0..4500)
         .map(|i| {
             let corners = mesh.corners(rng.below(mesh.indices.len()));
             let k = rng.below(3);
@@ -178,15 +179,15 @@ fn bvh06_coplanar_triangles_at_the_numbers_of_embrees_regression_lose_no_part() 
     let positions = flat.positions.iter().map(|&p| (turn * Vec3::from_array(p)).to_array()).collect();
     let turned = Triangles { positions, indices: flat.indices.clone() };
     for (what, mesh, least) in [("flat", flat, 0.0), ("turned", turned, 0.05)] {
-        let hits = agreed(what, &mesh, least, &rays(&mesh, 5000, &mut rng));
-        assert!(hits.iter().filter(|hit| hit.0 != MISS).count() > 1000);
+        let hits = agreed(what, &mesh, least, &rays(&mesh, 2500, &mut rng));
+        assert!(hits.iter().filter(|hit| hit.0 != MISS).count() > 500);
     }
 }
 
 #[test]
 fn bvh04_overlapping_diagonals_stay_within_the_budget() {
     // All through one point and along one diagonal: no cut parts them.
-    let n = 1 << 15;
+    let n = 1 << 14;
     let mut rng = Rng::new(45);
     let mesh = soup((0..n).map(|i| {
         let (side, s) = (rng.direction() * 1e-2, 1.0 + i as f32 * 1e-5);
@@ -242,7 +243,7 @@ impl HitFilter for Third {
 fn filters_that_are_asked_twice_about_a_split_triangle_change_no_hit() {
     let mut rng = Rng::new(47);
     let mesh = timber(&mut rng);
-    let rays = rays(&mesh, 5000, &mut rng);
+    let rays = rays(&mesh, 2500, &mut rng);
     let mut rays_in = batch(&rays);
     for i in 0..rays.len() {
         rays_in.key[i] = rng.bits();

@@ -216,7 +216,7 @@ def drone():
 
 
 def rafters():
-    """A timber hall that stands askew: beams, braces, stairs and wires, nearly all of them long, thin and diagonal."""
+    """A timber hall that stands askew: beams, braces, stairs and wires, long, thin and diagonal, and a jug of small triangles."""
     random, stage = Random(11), Stage("rafters")
     askew, beams, wires = turned(33), Dense(), Dense()
 

@@ -45,8 +45,12 @@ fn is_covered(polygon: &Polygon, boxes: &[[[f32; 3]; 2]]) -> bool {
             let bounds = inside.bounds();
             let (out, keeps) = match sides {
                 Some(sides) => (Some(sides[outer]), Some(sides[1 - outer])),
-                None if outer == 0 && bounds[1][axis] < at || outer == 1 && bounds[0][axis] > at => (Some(inside), None),
-                None if outer == 0 && bounds[0][axis] < at || outer == 1 && bounds[1][axis] > at => (Some(inside), None),
+                None if outer == 0 && bounds[1][axis] < at || outer == 1 && bounds[0][axis] > at => {
+                    (Some(inside), None)
+                }
+                None if outer == 0 && bounds[0][axis] < at || outer == 1 && bounds[1][axis] > at => {
+                    (Some(inside), None)
+                }
                 None => (None, Some(inside)),
             };
             if out.is_some_and(|out| !is_covered(&out, others)) {
@@ -87,12 +91,7 @@ fn visit(
     Ok(depth + 1)
 }
 
-fn visit_leaf(
-    tree: &Tree,
-    boxes: &mut [Vec<[[f32; 3]; 2]>],
-    leaf: Child,
-    bounds: [[f32; 3]; 2],
-) -> Result<(), String> {
+fn visit_leaf(tree: &Tree, boxes: &mut [Vec<[[f32; 3]; 2]>], leaf: Child, bounds: [[f32; 3]; 2]) -> Result<(), String> {
     if !leaf.is_leaf() {
         return Err(format!("{leaf:?} is a box in a tree over triangles"));
     }
