@@ -235,7 +235,7 @@ struct Third;
 
 impl HitFilter for Third {
     fn stops(&self, candidate: &Candidate) -> bool {
-        (candidate.key ^ candidate.primitive.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b) % 3 == 0
+        (candidate.key ^ candidate.primitive.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b).is_multiple_of(3)
     }
 }
 
