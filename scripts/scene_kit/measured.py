@@ -268,6 +268,6 @@ def rafters():
     floor = Dense().box((-7, -0.2, -13), (7, 0, 13))
     stage.put("floor", Dense().placed(floor, turn=askew), (0.5, 0.48, 0.45))
     stage.put("jug", Dense().placed(vase(profile(URN, 200), 160, 9, 0.05), (1.0, 0.0, 0.5)), (0.5, 0.35, 0.3))
-    stage.file.light("sun", "directional", 60000.0, at=(0, 500, 0), target=(210, 0, 130))
-    stage.file.camera("main", (3.1, 1.7, 8.4), (-1.2, 2.9, -2.0), 62)
+    stage.file.light("sun", "directional", 8.0, at=(0, 500, 0), target=(210, 0, 130))
+    stage.file.camera("main", (6.58, 1.7, 8.84), (-2.93, 2.9, -2.86), 62)
     return stage.file
