@@ -171,6 +171,7 @@ impl Accel for EmbreeAccel {
             isa: device.isa().to_owned(),
             bytes: device.memory_bytes(),
             front: 0,
+            splits: 0,
         }
     }
 }

@@ -125,6 +125,6 @@ impl Accel for Linear {
         };
         let object = |o: &Object| o.parts.iter().map(part).sum::<usize>();
         let bytes = object(&self.geometry.world) + self.geometry.objects.iter().map(object).sum::<usize>();
-        AccelStats { name: "linear", version: String::new(), isa: "scalar".into(), bytes, front: 0 }
+        AccelStats { name: "linear", isa: "scalar".into(), bytes, ..AccelStats::default() }
     }
 }

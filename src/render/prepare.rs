@@ -485,6 +485,7 @@ pub fn build_accel(
 
 /// What is said about the backend in use.
 fn report(accel: &dyn Accel, requested: &'static str, note: String) -> AccelReport {
-    let AccelStats { name, version, isa, front, .. } = accel.stats();
-    AccelReport { requested, used: name, version, isa, note, front_triangles: front as u64 }
+    let AccelStats { name, version, isa, front, splits, .. } = accel.stats();
+    let (front_triangles, splits) = (front as u64, splits as u64);
+    AccelReport { requested, used: name, version, isa, note, front_triangles, splits }
 }
