@@ -36,6 +36,11 @@ impl Rng {
         ((u64::from(self.bits()) * n as u64) >> 32) as usize
     }
 
+    /// One of `values`.
+    pub fn pick<T: Copy>(&mut self, values: &[T]) -> T {
+        values[self.below(values.len())]
+    }
+
     /// Uniform on the unit sphere.
     pub fn direction(&mut self) -> Vec3 {
         let z = self.range(-1.0, 1.0);
