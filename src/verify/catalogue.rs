@@ -2,11 +2,11 @@
 
 use super::meshes::{cuboid, grid, joined, placed, random_soup, slivers, soup, sphere};
 use super::rays::Inside;
-use super::rng::Rng;
 use crate::accel::Triangles;
 use crate::accel::geometry::{
     Affine, Candidate, Geometry, HitFilter, Object, Part, Placement, Primitives, Shape, ShapeHit, ShapeRay,
 };
+use crate::math::random::Rng;
 use glam::{Mat3, Quat, Vec3};
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub struct Entry {
 impl Entry {
     /// The mesh, always the same.
     pub fn subject(&self) -> Subject {
-        (self.build)(&mut Rng::new(0, self.name, 0))
+        (self.build)(&mut Rng::of_stream(0, self.name, 0))
     }
 }
 
@@ -82,7 +82,7 @@ fn closed(geometry: impl Into<Geometry>, centre: Vec3, radius: f32) -> Subject {
 
 /// pbrt's closed mesh of bumps: 16 x 16, radii 1 to 6.
 fn bumpy() -> Triangles {
-    let mut rng = Rng::new(12111, "bumpy", 0);
+    let mut rng = Rng::of_stream(12111, "bumpy", 0);
     sphere(16, 16, || 1.0 + 5.0 * rng.unit())
 }
 
