@@ -75,8 +75,8 @@ fn column(n: usize, s: f32, axis: Vec3, centre: Vec3) -> Triangles {
 
 #[test]
 fn self01_self03_slats_neither_catch_what_leaves_them_nor_shade_what_ends_on_them() {
-    // Seeded; 40,000 rays in all by each backend, and none may hit. (Of those that leave, 2.6 % did while edge functions
-    // were evaluated in f32 alone, and of those that end there 0.5 %.)
+    // Seeded; 40,000 rays in all by each backend. Of those that leave random slivers of this shape 3.3 % came back while
+    // edge functions were evaluated in f32 alone.
     let mut rng = Rng::new(1700);
     for (s, far) in [(1.0, 0.0), (1.0, 3.0), (1e-3, 0.0), (1e-3, 4.0), (1e4, 1.0)] {
         let axis = rng.direction();
