@@ -75,8 +75,8 @@ fn column(n: usize, s: f32, axis: Vec3, centre: Vec3) -> Triangles {
 
 #[test]
 fn self01_self03_slats_neither_catch_what_leaves_them_nor_shade_what_ends_on_them() {
-    // Seeded; 40,000 rays in all by each backend. Of those that leave random slivers of this shape 3.3 % came back while
-    // edge functions were evaluated in f32 alone.
+    // Seeded; 40,000 rays in all by each backend. While edge functions were evaluated in f32 alone, a quarter of both
+    // kinds were caught in the first case (969 and 990 of 4000).
     let mut rng = Rng::new(1700);
     for (s, far) in [(1.0, 0.0), (1.0, 3.0), (1e-3, 0.0), (1e-3, 4.0), (1e4, 1.0)] {
         let axis = rng.direction();
@@ -106,7 +106,7 @@ fn self01_self03_slats_neither_catch_what_leaves_them_nor_shade_what_ends_on_the
         for (name, accel) in backends(&mesh) {
             let hits = trace(&*accel, &rays);
             let of = |kind| hits.iter().zip(&kinds).filter(|(hit, k)| hit.0 != MISS && **k == kind).count();
-            // Embree's own arithmetic may catch a few (3 of 4000 that end there).
+            // Embree's own arithmetic may catch a few (3 of 4000, with a closed end of the ray).
             let most = if name == "embree" { 10 } else { 0 };
             println!("{name}: {} of 4000 that leave, {} of 4000 that end there; s {s}, far {far}", of(1), of(0));
             assert!(of(1) <= most && of(0) <= most, "{name}, s {s}, far {far}");
