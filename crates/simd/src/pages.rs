@@ -22,3 +22,17 @@ pub fn prefer_large_pages<T>(memory: &mut [T]) {
     #[cfg(not(target_os = "linux"))]
     let _ = memory;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::prefer_large_pages;
+
+    #[test]
+    fn memory_holds_what_it_held() {
+        let mut numbers: Vec<u64> = (0..1 << 20).collect();
+        for range in [0..0, 0..1, 3..700, 0..1 << 20] {
+            prefer_large_pages(&mut numbers[range]);
+        }
+        assert!(numbers.into_iter().eq(0..1 << 20));
+    }
+}

@@ -19,6 +19,7 @@ mod packet;
 mod queries;
 mod ray;
 mod reference;
+mod sort;
 mod source;
 mod special;
 mod traverse;
