@@ -7,7 +7,7 @@
 
 use super::ray::RayLanes;
 use crate::accel::RayBatch;
-use simd::{Buffer, Float, Kernel, Lanes, Mask, Uint};
+use simd::{Buffer, Float, Kernel, Lanes, Uint};
 
 /// Kinds of rays: octant and largest axis.
 const KINDS: usize = 8 * 4;
