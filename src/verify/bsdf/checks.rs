@@ -58,7 +58,7 @@ impl Difference {
         let (a, b) = (f64::from(a), f64::from(b));
         let difference = (a - b).abs() / a.abs().max(b.abs()).max(f64::from(scale));
         // NaN differs from everything.
-        if !(difference <= self.worst) {
+        if difference.is_nan() || difference > self.worst {
             self.worst = if difference.is_nan() { f64::INFINITY } else { difference };
             self.place = format!("{}: {a:e}, {b:e}", place());
         }
@@ -141,8 +141,9 @@ pub fn finiteness(scatterer: &dyn Scatterer, views: usize, samples_each: usize, 
         for (sample, u) in sampled.iter().zip(&u) {
             let Some(s) = sample else { continue };
             let length = s.wi.iter().map(|v| v * v).sum::<f32>();
-            let is_fault =
-                s.weight.iter().any(|w| !w.is_finite() || *w < 0.0) || !(s.pdf > 0.0) || !((length - 1.0).abs() < 1e-4);
+            let is_weight_bad = s.weight.iter().any(|w| !w.is_finite() || *w < 0.0);
+            let is_unit = (length - 1.0).abs() < 1e-4;
+            let is_fault = is_weight_bad || !is_unit || s.pdf.is_nan() || s.pdf <= 0.0;
             faults.note(is_fault, || format!("wo {wo:?}, u {u:?}: {s:?}"));
         }
         wi.extend(sampled.into_iter().flatten().map(|s| s.wi));
