@@ -332,10 +332,10 @@ fn bsdf_05_disney_is_sampled_without_great_weights() {
             let found = furnace(&lobe, wo, 100, 6);
             greatest = greatest.max(found.albedo[0]).max(found.albedo[1]).max(found.albedo[2]);
             assert!(found.greatest < 60.0, "{lobe:?} from {wo:?}: {found:?}");
-            // The estimate leaves out masking, so dark metals are off.
+            // The estimate leaves out masking, so rough metals and grazing angles are off.
             let estimate = ask(Level::best(), lobe, wo, &[wo])[0].albedo;
-            if matches!(lobe, Lobe::Disney(p) if p.metallic == 0.0) {
-                let is_near = (0..3).all(|k| (f64::from(estimate[k]) - found.albedo[k]).abs() < 0.6);
+            if wo[2] >= 0.5 && matches!(lobe, Lobe::Disney(p) if p.metallic == 0.0) {
+                let is_near = (0..3).all(|k| (f64::from(estimate[k]) - found.albedo[k]).abs() < 0.4);
                 assert!(is_near, "{lobe:?} from {wo:?}: {found:?}, estimate {estimate:?}");
             }
         }

@@ -104,7 +104,7 @@ impl<L: Lanes> Disney<L> {
     }
 
     /// Share of light that is reflected, per colour, as estimated for the choice between lobes: without masking and
-    /// retro-reflection, so within 0.6 for dielectrics and far too much for rough metals. 0 in lanes that are not shaded by it.
+    /// retro-reflection, so within 0.4 for dielectrics up to 60 degrees, too much beyond and for rough metals. 0 in lanes that are not shaded by it.
     #[inline(always)]
     pub fn albedo(&self) -> V3<L> {
         self.albedo
