@@ -201,7 +201,7 @@ fn any_disney(rng: &mut Rng, edges: f32) -> Lobe {
 /// Disney materials of every kind, none of which is too narrow for angles.
 fn disneys() -> Vec<Lobe> {
     let mut rng = Rng::new(7, "disneys", 0);
-    let mut lobes: Vec<Lobe> = (0..24).map(|_| any_disney(&mut rng, 0.5)).collect();
+    let mut lobes: Vec<Lobe> = (0..12).map(|_| any_disney(&mut rng, 0.5)).collect();
     for lobe in &mut lobes {
         if let Lobe::Disney(p) = lobe {
             p.roughness = p.roughness.max(0.5);
