@@ -7,7 +7,7 @@ pub mod energy;
 pub mod extensions;
 mod film;
 pub mod layered;
-mod lobes;
+pub mod lobes;
 pub mod surface;
 pub mod table;
 

@@ -178,13 +178,30 @@ pub fn pow5<F: Float>(v: F) -> F {
 pub fn exp<L: Lanes>(x: L::F) -> L::F {
     let f = |v: f32| L::F::splat(v);
     let x = x.max(f(-88.0)).min(f(88.0));
-    // x = n ln 2 + r with |r| <= ln 2 / 2, ln 2 in two parts.
+    // x = n ln 2 + r with |r| <= ln 2 / 2, ln 2 in two parts: products of n with the first are exact, fused or not.
     let n = (x * f(std::f32::consts::LOG2_E) + f(0.5)).floor();
-    let r = n.mul_add(f(1.428_606_8e-6), n.mul_add(f(-0.693_148_6), x));
-    let tail = r.mul_add(r.mul_add(f(1.0 / 720.0), f(1.0 / 120.0)), f(1.0 / 24.0));
+    let r = n.mul_add(f(2.121_944_4e-4), n.mul_add(f(-0.693_359_4), x));
+    let tail = r.mul_add(f(1.0 / 5040.0), f(1.0 / 720.0));
+    let tail = r.mul_add(r.mul_add(tail, f(1.0 / 120.0)), f(1.0 / 24.0));
     let p = r.mul_add(r.mul_add(r.mul_add(r.mul_add(tail, f(1.0 / 6.0)), f(0.5)), f(1.0)), f(1.0));
     let power = (n + f(127.0)).max(f(0.0)).to_uint().shl(23).to_float_bits();
     p * power
+}
+
+/// Natural logarithm, relative error below 3e-7; that of the smallest normal number (-87.3) for 0, NaN and all below it.
+#[inline(always)]
+pub fn ln<L: Lanes>(x: L::F) -> L::F {
+    let f = |v: f32| L::F::splat(v);
+    // x = 2^n m with m in [sqrt(1/2), sqrt(2)); the integer constants are 1.0 and sqrt(1/2).
+    let bits = x.max(f(f32::MIN_POSITIVE)).to_bits() + L::U::splat(0x3f80_0000 - 0x3f35_04f3);
+    let n = bits.shr(23).to_float() - f(127.0);
+    let m = ((bits & L::U::splat(0x007f_ffff)) + L::U::splat(0x3f35_04f3)).to_float_bits();
+    // ln m = 2 artanh s.
+    let s = (m - f(1.0)) / (m + f(1.0));
+    let s2 = s * s;
+    let tail = s2.mul_add(s2.mul_add(s2.mul_add(f(2.0 / 9.0), f(2.0 / 7.0)), f(2.0 / 5.0)), f(2.0 / 3.0));
+    // ln 2 in two parts.
+    n.mul_add(f(0.693_148_6), n.mul_add(f(-1.428_606_8e-6), s.mul_add(s2 * tail, s + s)))
 }
 
 /// (cos 2 pi u, sin 2 pi u) for u in [0, 1], absolute error below 3e-7.
@@ -243,6 +260,34 @@ pub(crate) mod tests {
                     assert_eq!(exp::<L>(L::F::splat(x)).first(), 0.0, "e^{x}");
                 }
                 assert!(exp::<L>(L::F::splat(f32::INFINITY)).first().is_finite());
+            }
+        }
+        at_all_levels(Check);
+    }
+
+    #[test]
+    fn ln_is_that_of_f64() {
+        #[derive(Clone)]
+        struct Check;
+        impl Kernel for Check {
+            type Output = ();
+
+            #[inline(always)]
+            fn run<L: Lanes>(self) {
+                for i in -8000..8000 {
+                    // All magnitudes, and crowded about 1.
+                    for x in [(i as f32 * 0.01).exp(), 1.0 + i as f32 * 1e-4] {
+                        let found = f64::from(ln::<L>(L::F::splat(x)).first());
+                        let exact = f64::from(x).ln();
+                        if x > 0.0 {
+                            assert!((found - exact).abs() <= 3e-7 * exact.abs(), "ln {x}: {found}, f64 {exact}");
+                        }
+                    }
+                }
+                assert_eq!(ln::<L>(L::F::splat(1.0)).first(), 0.0);
+                for x in [0.0, -1.0, 1e-40, f32::NAN] {
+                    assert!((ln::<L>(L::F::splat(x)).first() + 87.336_55).abs() < 1e-4, "ln {x}");
+                }
             }
         }
         at_all_levels(Check);

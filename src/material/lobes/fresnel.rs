@@ -59,8 +59,8 @@ mod tests {
     fn exact(cos_i: f32, eta: f32) -> f64 {
         let (c, eta) = (f64::from(cos_i), f64::from(eta));
         let g2 = c * c + (eta - 1.0) * (eta + 1.0);
-        if g2 < 0.0 {
-            return 1.0;
+        if g2 < 0.0 || eta == 1.0 {
+            return if eta == 1.0 { 0.0 } else { 1.0 };
         }
         let cos_t = g2.sqrt() / eta;
         let s = (c - eta * cos_t) / (c + eta * cos_t);
@@ -91,14 +91,14 @@ mod tests {
             for share in [0.0, 0.5, 0.99, 0.999_99] {
                 assert_eq!(at(critical * share, eta), 1.0, "eta {eta}, {share} of the critical cosine");
             }
-            // The reflectance falls as a square root from there.
-            assert!(at(critical * (1.0 + 1e-7), eta) > 1.0 - 2e-3, "eta {eta}");
+            // The reflectance falls as a square root from there: the next f32 is down by 0.005 at eta 0.4.
+            let next = critical * (1.0 + 1.2e-7);
+            assert!((at(next, eta) - exact(next, eta)).abs() < 5e-3 && at(next, eta) > 1.0 - 1e-2, "eta {eta}");
         }
     }
 
     #[test]
     fn bsdf_06_indices_near_one_lose_no_digits() {
-        let mut worst = 0.0f64;
         for eta in [1.0f32, 1.000_000_1, 1.000_001, 1.0001, 1.01, 1.5, 10.0, 0.999_999_9, 0.9999, 0.5] {
             for i in 0..=4000 {
                 let t = i as f32 / 4000.0;
@@ -109,12 +109,9 @@ mod tests {
                     continue; // a last bit of the cosine decides
                 }
                 let error = (found - expected).abs();
-                // Where p vanishes only half the reflectance is left to compare with.
-                worst = worst.max(error / expected.max(1e-30) * f64::from(u8::from(eta != 1.0)));
                 assert!(error <= 1e-4 * expected, "cos {cos}, eta {eta}: {found}, not {expected}");
             }
         }
-        assert!(worst < 1e-4);
         for cos in [0.0, 1e-9, 1e-4, 1.7e-4, 0.5, 1.0] {
             assert_eq!(at(cos, 1.0), 0.0, "no interface at cos {cos}");
         }

@@ -38,8 +38,8 @@ pub struct Visible<L: Lanes> {
     wo: V3<L>,
     ax: L::F,
     ay: L::F,
-    /// Share of the cap of normals below the horizon of the stretched viewer that is sampled: 1 = all of it.
-    k: L::F,
+    /// Share of the cap of normals below the horizon of the stretched viewer that is left out (1 - k of the papers).
+    left_out: L::F,
     /// `k wo.z + |stretched wo|`.
     divisor: L::F,
 }
@@ -53,15 +53,15 @@ impl<L: Lanes> Visible<L> {
         let a = ax.min(ay).min(one);
         let a2 = a * a;
         let s = one + wo.x.mul_add(wo.x, wo.y * wo.y).sqrt();
-        let s2 = s * s;
-        let k = (one - a2) * s2 / (a2 * wo.z).mul_add(wo.z, s2);
-        Self::with_cap(wo, ax, ay, k.or_else(wo.z.gt(L::F::zero()), one))
+        let (s2, z2) = (s * s, wo.z * wo.z);
+        let left_out = a2 * (s2 + z2) / a2.mul_add(z2, s2);
+        Self::with_cap(wo, ax, ay, left_out.masked(wo.z.gt(L::F::zero())))
     }
 
     /// All that are seen: for refraction, where a normal that reflects to below the surface may refract all the same.
     #[inline(always)]
     pub fn all(wo: V3<L>, ax: L::F, ay: L::F) -> Self {
-        Self::with_cap(wo, ax, ay, L::F::one())
+        Self::with_cap(wo, ax, ay, L::F::zero())
     }
 
     /// [`Visible::all`] in `lanes`, [`Visible::new`] in the others.
@@ -72,30 +72,37 @@ impl<L: Lanes> Visible<L> {
     }
 
     #[inline(always)]
-    fn with_cap(wo: V3<L>, ax: L::F, ay: L::F, k: L::F) -> Self {
+    fn with_cap(wo: V3<L>, ax: L::F, ay: L::F, left_out: L::F) -> Self {
         let (x, y) = (wo.x * ax, wo.y * ay);
         let length = wo.z.mul_add(wo.z, x.mul_add(x, y * y)).sqrt();
         // Both terms cancel where a smooth surface is seen from below; nothing is seen there.
-        Self { wo, ax, ay, k, divisor: k.mul_add(wo.z, length).max(L::F::splat(1e-30)) }
+        let divisor = (L::F::one() - left_out).mul_add(wo.z, length).max(L::F::splat(1e-30));
+        Self { wo, ax, ay, left_out, divisor }
     }
 
-    /// A normal by `u` in [0, 1)^2: unit, z > 0, and `wo . h` >= 0 but for rounding (-1e-6).
+    /// A normal by `u` in [0, 1)^2: unit, z > 0, and `wo . h` >= 0 (seen from below: but for rounding).
     #[inline(always)]
     pub fn sample(&self, u: [L::F; 2]) -> V3<L> {
-        let one = L::F::one();
+        let (zero, one) = (L::F::zero(), L::F::one());
         let (cos_phi, sin_phi) = cos_sin_2pi::<L>(u[1]);
         let (x, y) = (self.wo.x * self.ax, self.wo.y * self.ay);
         // At least 1e-4 long, unless alpha is less or `wo` is no direction.
         let scale = one / self.wo.z.mul_add(self.wo.z, x.mul_add(x, y * y)).sqrt().max(L::F::splat(1e-30));
         let stretched = V3::<L>::new(x * scale, y * scale, self.wo.z * scale);
         // A point of the unit sphere with z in (-bottom, 1], plus the stretched viewer, is the stretched normal. Written so
-        // that nothing cancels near z = -1.
-        let bottom = self.k * stretched.z;
-        let above = (one - u[0]) * (one + bottom);
-        let rho = safe_sqrt(u[0] * (one + bottom) * (above + (one - bottom)));
-        let z = above + (one - self.k) * stretched.z;
+        // that nothing cancels near z = -1, where normals are seen edge-on.
+        let r2 = stretched.x.mul_add(stretched.x, stretched.y * stretched.y);
+        let to_pole = (r2 / (one + stretched.z)).or_else(stretched.z.gt(zero), one - stretched.z);
+        let to_bottom = self.left_out.mul_add(stretched.z, to_pole);
+        let height = L::F::splat(2.0) - to_bottom;
+        let above = (one - u[0]) * height;
+        let rho = safe_sqrt(u[0] * height * (above + to_bottom));
+        let z = self.left_out.mul_add(stretched.z, above);
         let h = V3::<L>::new(rho.mul_add(cos_phi, stretched.x), rho.mul_add(sin_phi, stretched.y), z);
-        V3::<L>::new(h.x * self.ax, h.y * self.ay, h.z.max(L::F::splat(1e-9))).normalized()
+        let h = V3::<L>::new(h.x * self.ax, h.y * self.ay, h.z.max(L::F::splat(1e-9))).normalized();
+        // The sum may be rounding and no more where both parts cancel: onto the side that is seen.
+        let behind = (-self.wo.dot(h)).max(zero).masked(self.wo.z.ge(zero));
+        self.wo.mul_add(behind + behind, h)
     }
 
     /// Density over the directions `wi` that the normal `h` reflects `wo` to, 1/sr, where `d` = [`distribution`]`(h)`.
