@@ -68,7 +68,7 @@ impl<L: Lanes> Visible<L> {
     #[inline(always)]
     pub fn all_in(lanes: L::M, wo: V3<L>, ax: L::F, ay: L::F) -> Self {
         let bounded = Self::new(wo, ax, ay);
-        Self::with_cap(wo, ax, ay, L::F::one().or_else(lanes, bounded.k))
+        Self::with_cap(wo, ax, ay, L::F::zero().or_else(lanes, bounded.left_out))
     }
 
     #[inline(always)]
