@@ -1,8 +1,6 @@
 //! Where a path has hit: geometry, attributes, the normals it is shaded with, and the point from which it goes on.
 
 use super::SceneTables;
-use super::pool::PathPool;
-use super::shade::load3;
 use super::terminator::lift;
 use crate::accel::HitBatch;
 use crate::math::{UvSets, V3, robust};
@@ -50,22 +48,22 @@ fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, hit: L::M)
     tables.placements.get::<L>(L::U::load(&hits.instance, at), hit)
 }
 
-/// Geometry of the hits.
+/// Geometry of the hits `at ..`, seen from the directions `wo` (unit).
 #[inline(always)]
 pub(super) fn interact<L: Lanes>(
     tables: &SceneTables,
-    pool: &PathPool,
+    hits: &HitBatch,
     at: usize,
+    wo: V3<L>,
     primitive: L::U,
     hit: L::M,
 ) -> Interaction<L> {
     let zero = L::F::zero();
     let none = L::M::from_bits(0);
     let triangle = tables.triangles.get::<L>(primitive);
-    let b = [L::F::load(&pool.hits.u, at), L::F::load(&pool.hits.v, at)];
-    let placed = placed::<L>(tables, &pool.hits, at, hit);
+    let b = [L::F::load(&hits.u, at), L::F::load(&hits.v, at)];
+    let placed = placed::<L>(tables, hits, at, hit);
     let (triangle, p, offset) = triangle.placed(&placed, triangle.point(b[0], b[1]));
-    let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
     let front = wo.dot(triangle.ng).gt(zero);
     let ng = triangle.ng.or_else(front, -triangle.ng);
     let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
@@ -106,13 +104,14 @@ impl<L: Lanes> Interaction<L> {
         normal.or_else(self.front, -normal)
     }
 
-    /// Where rays leave: off the surface on the viewer's side, since all there is is reflection.
+    /// Where rays leave on the viewer's side: off the surface.
     #[inline(always)]
     pub fn start(&self) -> V3<L> {
         robust::offset_point(self.origin, self.ng, self.offset)
     }
 
-    /// Just behind the surface, where a ray that passes it goes on.
+    /// Just behind the surface, where a ray that goes through it goes on. Nothing is raised there: what a coarse mesh
+    /// stands for is its outside.
     #[inline(always)]
     pub fn behind(&self) -> V3<L> {
         robust::offset_point(self.p, -self.ng, self.offset)
@@ -127,5 +126,11 @@ impl<L: Lanes> Interaction<L> {
             return outside;
         }
         outside | (self.lifted & wi.dot(self.to_viewer(self.normal)).gt(L::F::zero()))
+    }
+
+    /// Whether `wi` leads away from the triangle behind the surface.
+    #[inline(always)]
+    pub fn is_behind(&self, wi: V3<L>) -> L::M {
+        wi.dot(self.ng).lt(L::F::zero())
     }
 }

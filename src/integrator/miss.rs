@@ -1,6 +1,7 @@
 //! Rays that hit nothing see the environment.
 
 use super::SceneTables;
+use super::medium::Stack;
 use super::pool::PathPool;
 use super::shade::{add_lanes, load3};
 use crate::math::V3;
@@ -14,7 +15,10 @@ pub fn see_environment<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: 
         return;
     }
     let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
-    let beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
+    let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
+    if tables.media.has_volume() {
+        beta = beta * tables.media.transmittance_from_far(Stack::<L>::load(&pool.media, at).innermost());
+    }
     let (radiance, pdf): (V3<L>, L::F) = tables.lights.environment::<L>(direction);
     let ratio = pdf / L::F::load(&pool.prev_pdf, at);
     let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());

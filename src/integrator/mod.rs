@@ -3,22 +3,29 @@
 //! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
+mod closure;
 mod coverage;
+mod dispersion;
 mod interaction;
+mod light_sample;
+mod medium;
 mod miss;
 mod normals;
 mod pool;
 mod shade;
 mod terminator;
+mod through;
 mod wave;
 
 pub use coverage::Coverage;
+pub use dispersion::Spectrum;
 pub use pool::POOL;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;
 use crate::camera::{CameraRays, PixelFilter};
 use crate::light::table::LightTable;
+use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::shape::placement::PlacementTable;
 use crate::shape::table::TriangleTable;
@@ -33,6 +40,10 @@ pub struct SceneTables {
     pub placements: PlacementTable,
     /// Surface parameters.
     pub materials: MaterialTable,
+    /// What is inside of surfaces.
+    pub media: MediumTable,
+    /// Wavelengths, in scenes with dispersion.
+    pub spectrum: Option<Spectrum>,
     /// Texels.
     pub textures: TextureTable,
     /// Lights with selection probabilities.

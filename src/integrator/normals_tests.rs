@@ -1,10 +1,11 @@
 //! Frames of stretched highlights and normals of coats, on single triangles.
 
 use super::super::interaction::interact;
-use super::super::pool::PathPool;
 use super::*;
+use crate::accel::HitBatch;
 use crate::light::table::LightTable;
 use crate::material::Material;
+use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::shape::placement::PlacementTable;
 use crate::shape::table::{Corners, TriangleTable};
@@ -51,7 +52,8 @@ impl Patch {
         };
         triangles.push(CORNERS, Vec3::Z, 0, attributes, tangents);
         let (placements, lights) = (PlacementTable::default(), LightTable::default());
-        SceneTables { triangles, placements, materials, textures, lights }
+        let (media, spectrum) = (MediumTable::new(&[]), None);
+        SceneTables { triangles, placements, materials, media, spectrum, textures, lights }
     }
 }
 
@@ -68,14 +70,14 @@ impl Kernel for Look<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> [Vec3; 4] {
-        let mut pool = PathPool::new();
+        let mut hits = HitBatch::new(16);
         let target = Vec3::new(0.25, 0.25, 0.0);
         for i in 0..16 {
-            pool.rays.set(i, self.patch.eye, (target - self.patch.eye).normalize(), f32::INFINITY);
-            (pool.hits.u[i], pool.hits.v[i]) = (0.25, 0.25);
+            (hits.u[i], hits.v[i]) = (0.25, 0.25);
         }
+        let wo = V3::<L>::splat((self.patch.eye - target).normalize().into());
         let all = L::M::first(L::N);
-        let si = interact::<L>(self.tables, &pool, 0, L::U::splat(0), all);
+        let si = interact::<L>(self.tables, &hits, 0, wo, L::U::splat(0), all);
         let direction = [L::F::splat(self.direction[0]), L::F::splat(self.direction[1])];
         let frame = anisotropy_frame(self.tables, &si, V3::<L>::splat(self.ns.into()), direction, all);
         let coat = coat_normal(self.tables, &si, all);

@@ -1,11 +1,18 @@
 //! The state of a worker's paths, structure of arrays, small enough for the L2 cache.
 
+use super::SceneTables;
+use super::medium::DEPTH;
+use super::through::Glass;
 use crate::accel::{HitBatch, RayBatch};
+use crate::material::media::AIR;
 use crate::math::V3;
 use simd::{Buffer, Float, Lanes, Mask, Uint};
 
 /// Paths in flight per worker. 1024 to 4096 measured equal; more no longer fits in L2.
 pub const POOL: usize = 2048;
+
+/// One vector more than paths, so that a whole vector may be stored behind the last compacted path.
+pub(super) const ROOM: usize = POOL + 16;
 
 /// Paths in flight. Index i of every array below is path i; live paths are kept at the front. A path's radiance lives
 /// in a slot that stays put while the path moves.
@@ -26,6 +33,16 @@ pub struct PathPool {
     pub seed: Buffer<u32>,
     /// Sample index.
     pub sample: Buffer<u32>,
+    /// Media they are in, innermost first. Here and below: empty where the scene has no use for it.
+    pub media: [Buffer<u32>; DEPTH],
+    /// nm; 0 where dispersion has not split the path.
+    pub wavelength: Buffer<f32>,
+    /// Metres gone straight through thin glass since the last scattering, up to where the ray starts.
+    pub travelled: Buffer<f32>,
+    /// Surfaces of thin glass gone straight through, ever.
+    pub passes: Buffer<u32>,
+    /// What shadow rays through thin glass need; `None` where there is none.
+    pub glass: Option<Box<Glass>>,
     /// Where the path's radiance is.
     pub slot: Buffer<u32>,
 
@@ -55,8 +72,7 @@ pub struct PathPool {
 impl PathPool {
     /// An empty pool.
     pub fn new() -> Self {
-        // One vector more than paths, so that a whole vector may be stored behind the last compacted path.
-        let room = POOL + 16;
+        let room = ROOM;
         let floats = || Buffer::new(room);
         let ints = || Buffer::new(room);
         Self {
@@ -68,6 +84,11 @@ impl PathPool {
             depth: ints(),
             seed: ints(),
             sample: ints(),
+            media: std::array::from_fn(|_| Buffer::new(0)),
+            wavelength: Buffer::new(0),
+            travelled: Buffer::new(0),
+            passes: Buffer::new(0),
+            glass: None,
             slot: ints(),
             radiance: vec![[0.0; 3]; POOL],
             origin: vec![(0, 0); POOL],
@@ -82,6 +103,37 @@ impl PathPool {
         }
     }
 
+    /// Makes room for what paths in the scene of `tables` remember beyond other paths.
+    pub fn fit(&mut self, tables: &SceneTables) {
+        let media = &tables.media;
+        if media.has_volume() && self.media[0].is_empty() {
+            self.media = std::array::from_fn(|_| Buffer::new(ROOM));
+        }
+        if media.has_dispersion() && self.wavelength.is_empty() {
+            self.wavelength = Buffer::new(ROOM);
+        }
+        if media.has_thin_glass() && self.glass.is_none() {
+            (self.travelled, self.passes) = (Buffer::new(ROOM), Buffer::new(ROOM));
+            self.glass = Some(Box::default());
+        }
+    }
+
+    /// Path `i` starts: outside of everything.
+    #[inline]
+    pub fn begin(&mut self, i: usize) {
+        if !self.media[0].is_empty() {
+            for medium in &mut self.media {
+                medium[i] = AIR;
+            }
+        }
+        if !self.wavelength.is_empty() {
+            self.wavelength[i] = 0.0;
+        }
+        if !self.passes.is_empty() {
+            (self.travelled[i], self.passes[i]) = (0.0, 0);
+        }
+    }
+
     /// Appends shadow rays of the lanes `keep`, packed: where they start, their direction and end (in units of it), whom
     /// they light and with what.
     #[inline(always)]
@@ -93,6 +145,9 @@ impl PathPool {
         radiance: V3<L>,
     ) {
         let to = self.n_shadow;
+        if let Some(glass) = &mut self.glass {
+            glass.push(keep, origin + direction, to);
+        }
         origin.x.compress(keep, &mut self.shadow.ox, to);
         origin.y.compress(keep, &mut self.shadow.oy, to);
         origin.z.compress(keep, &mut self.shadow.oz, to);

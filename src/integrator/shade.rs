@@ -1,16 +1,16 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
-use super::interaction::{Interaction, interact};
+use super::PathTracer;
+use super::closure::{closure, surface};
+use super::interaction::interact;
+use super::light_sample::{Vertex, queue_light_sample};
+use super::medium::{Crossing, Stack};
 use super::miss::see_environment;
-use super::normals::{shading_normal, view};
 use super::pool::PathPool;
 use super::wave::Counters;
-use super::{PathTracer, SceneTables};
 use crate::accel::MISS;
-use crate::material::bsdf::Bsdf;
-use crate::material::surface::Surface;
+use crate::material::media::{AIR, MediumTable};
 use crate::math::V3;
-use crate::math::bend::let_mirror_leave;
 use crate::sampler::{Key, coverage_key, dims};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
 
@@ -58,20 +58,44 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     if tables.lights.has_environment() {
         see_environment::<L>(tables, pool, at, slot, active & !hit);
     }
+    if tables.media.has_volume() {
+        let inside = !Stack::<L>::load(&pool.media, at).innermost().eq(L::U::splat(AIR));
+        counters.unpaired += (active & !hit & inside).count() as u64;
+    }
     if !hit.any() {
         slot.compress(active, &mut pool.dead, pool.n_dead);
         pool.n_dead += active.count();
         return;
     }
     let depth = L::U::load(&pool.depth, at);
-    let beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
-    let si = interact::<L>(tables, pool, at, primitive, hit);
+    let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
+    let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
+    let si = interact::<L>(tables, &pool.hits, at, wo, primitive, hit);
     let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
     let mut culled = L::M::from_bits(0);
     if tracer.cull_backfaces {
         culled = tables.materials.single_sided::<L>(si.triangle.material, hit) & depth.eq(L::U::splat(0)) & !si.front;
+        // The boundary of a volume has two sides whatever the file says of its surface.
+        culled = culled & !tables.media.is_boundary::<L>(MediumTable::inside::<L>(si.triangle.material), culled);
         hit = hit & !culled;
     }
+    // What lies between the last scattering and this hit: media that absorb, glass that was gone straight through.
+    let mut distance = L::F::load(&pool.hits.t, at);
+    let crossing = if tables.media.has_volume() {
+        let crossing = Crossing::<L>::new(tables, pool, at, si.triangle.material, si.front, hit, &key);
+        beta = beta * crossing.transmittance(&tables.media, distance);
+        Some(crossing)
+    } else {
+        None
+    };
+    let mut thin = L::M::from_bits(0);
+    let mut passes = L::U::splat(0);
+    if tables.media.has_thin_glass() {
+        thin = tables.media.is_thin_glass::<L>(MediumTable::inside::<L>(si.triangle.material), hit);
+        distance = distance + L::F::load(&pool.travelled, at);
+        passes = L::U::load(&pool.passes, at);
+    }
+    let vertex = depth + passes;
     if tables.materials.has_unlit() {
         let unlit = tables.materials.unlit::<L>(si.triangle.material, hit);
         if unlit.any() {
@@ -89,8 +113,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         if lit.any() {
             // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
             // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
-            let t = L::F::load(&pool.hits.t, at);
-            let pdf_light = si.triangle.light_density * t * t / si.wo.dot(si.triangle.ng).abs();
+            let pdf_light = si.triangle.light_density * distance * distance / si.wo.dot(si.triangle.ng).abs();
             let ratio = pdf_light / L::F::load(&pool.prev_pdf, at);
             let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
             add_lanes::<L>(pool, slot, (beta * le).scale(weight), lit);
@@ -98,26 +121,44 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
 
     let allowed = depth.lt(L::U::splat(tracer.max_bounces.saturating_add(1)));
-    if tracer.is_capped {
-        counters.truncated += (hit & !allowed).count() as u64;
-    }
     let scatters = hit & allowed;
-    let bsdf = closure::<L>(tables, &si, scatters);
+    // Going straight through is no scattering.
+    let shaded = scatters | (thin & hit);
+    let eta = match &crossing {
+        Some(crossing) => crossing.eta,
+        None => L::F::one(),
+    };
+    let closure = closure::<L>(tables, &pool.hits, at, &si, eta, shaded);
     let start = si.start();
 
     if !tables.lights.is_empty() {
-        let u = key.group(depth + depth + L::U::splat(dims::FIRST_LIGHT));
+        let u = key.group(vertex + vertex + L::U::splat(dims::FIRST_LIGHT));
         let to = pool.n_shadow;
-        let cast = queue_light_sample::<L>(tables, pool, &si, &bsdf, start, beta, slot, [u[0], u[1], u[2]], scatters);
+        let here = Vertex { si: &si, closure: &closure, crossing: crossing.as_ref(), start, beta, slot };
+        let cast = queue_light_sample::<L>(tables, pool, &here, [u[0], u[1], u[2]], scatters);
         if tables.materials.has_alpha() {
             coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow.key, to);
         }
     }
 
-    let u = key.group(depth + depth + L::U::splat(dims::FIRST_BSDF));
-    let sample = bsdf.sample([u[0], u[1]], u[2]);
+    let u = key.group(vertex + vertex + L::U::splat(dims::FIRST_BSDF));
+    let sample = closure.bsdf.sample([u[0], u[1]], u[2]);
     let mut beta = beta * sample.weight;
-    let mut alive = scatters & sample.valid & si.is_outside(sample.wi);
+    let mut leaves = si.is_outside(sample.wi);
+    // Lanes that go on behind the surface; those of them that go on as they came, unless roulette or light ends them.
+    let (mut through, mut straight) = (L::M::from_bits(0), L::M::from_bits(0));
+    if tables.media.transmits() {
+        straight = shaded & sample.straight;
+        through = straight | (scatters & sample.transmitted);
+        leaves = straight | (leaves & !through) | (through & si.is_behind(sample.wi));
+        if let Some(crossing) = &crossing {
+            beta = crossing.colored(beta, through & crossing.is_boundary);
+        }
+    }
+    if tracer.is_capped {
+        counters.truncated += (hit & !allowed & !straight).count() as u64;
+    }
+    let mut alive = (scatters | straight) & sample.valid & leaves;
     let broken = alive & !(beta.is_finite() & sample.wi.is_finite());
     if broken.any() {
         add_lanes::<L>(pool, slot, V3::splat([f32::NAN; 3]), broken);
@@ -126,15 +167,26 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     alive = alive & !broken & brightest.gt(L::F::zero());
     // Unbiased roulette on the square root of the throughput, no cap: 1.14 times the efficiency of min(beta, 0.95) in
     // diffuse interiors.
-    let rolls = alive & !depth.lt(L::U::splat(ROULETTE_DEPTH - 1));
+    let rolls = alive & !straight & !depth.lt(L::U::splat(ROULETTE_DEPTH - 1));
     if rolls.any() {
-        let survival = brightest.sqrt().min(L::F::one());
+        // Radiance is denser in a denser medium, by the square of its index; the path is worth the same.
+        let worth = match &crossing {
+            Some(crossing) => brightest * crossing.density(&tables.media, through),
+            None => brightest,
+        };
+        let survival = worth.sqrt().min(L::F::one());
         alive = alive & (!rolls | u[3].lt(survival));
         beta = beta.scale(L::F::one() / survival).or_else(rolls, beta);
     }
 
     let mut next = Next { origin: start, direction: sample.wi, beta, pdf: sample.pdf, depth: depth + L::U::splat(1) };
     let to = pool.n;
+    if tables.media.transmits() {
+        next.origin = si.behind().or_else(through, next.origin);
+        next.direction = (-si.wo).or_else(straight, next.direction);
+        next.pdf = L::F::load(&pool.prev_pdf, at).or_else(straight, next.pdf);
+        next.depth = depth.or_else(straight, next.depth);
+    }
     if tracer.cull_backfaces {
         // Rays that pass go on as they were, from behind the surface.
         next = Next {
@@ -150,6 +202,13 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         coverage_key::<L>(key.pixel, key.sample, next.depth).compress(alive, &mut pool.rays.key, to);
     }
 
+    if let Some(crossing) = &crossing {
+        crossing.follow(pool, counters, at, to, through & !straight, alive);
+    }
+    if tables.media.has_thin_glass() {
+        distance.masked(straight | culled).compress(alive, &mut pool.travelled, to);
+        (passes + L::U::splat(1)).or_else(straight, passes).compress(alive, &mut pool.passes, to);
+    }
     slot.compress(active & !alive, &mut pool.dead, pool.n_dead);
     pool.n_dead += (active & !alive).count();
     next.origin.x.compress(alive, &mut pool.rays.ox, to);
@@ -168,66 +227,6 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     key.sample.compress(alive, &mut pool.sample, to);
     slot.compress(alive, &mut pool.slot, to);
     pool.n += alive.count();
-}
-
-/// Textures and vertex colours applied.
-#[inline(always)]
-fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Surface<L> {
-    let mut surface = tables.materials.surface(&tables.textures, si.triangle.material, &si.uvs, active);
-    if tables.triangles.has_colors() {
-        // Exporters write colours above 1; a base colour is a reflectance.
-        surface.base = (surface.base * si.color).min(V3::splat([1.0; 3]));
-    }
-    surface
-}
-
-/// Textures applied, shading frame found: what is left is directions.
-#[inline(always)]
-fn closure<'t, L: Lanes>(tables: &'t SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<'t, L> {
-    let surface = surface(tables, si, active);
-    if !tables.has_shading_normals() {
-        let view = view(tables, si, &surface, si.ng, active);
-        return Bsdf::new(&surface, &view, tables.materials.energy());
-    }
-    let ns = shading_normal(tables, si, active);
-    // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
-    let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
-    let low = low & active & surface.has_specular();
-    let view = view(tables, si, &surface, bent.or_else(low, ns), active);
-    let bsdf = Bsdf::new(&surface, &view, tables.materials.energy());
-    if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
-}
-
-/// Next event estimation: queues a shadow ray with its finished contribution; the lanes that have one.
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "the vertex's state, spread over lanes")]
-fn queue_light_sample<L: Lanes>(
-    tables: &SceneTables,
-    pool: &mut PathPool,
-    si: &Interaction<L>,
-    bsdf: &Bsdf<'_, L>,
-    start: V3<L>,
-    beta: V3<L>,
-    slot: L::U,
-    u: [L::F; 3],
-    scatters: L::M,
-) -> L::M {
-    let (zero, one) = (L::F::zero(), L::F::one());
-    let light = tables.lights.sample::<L>(si.origin, u, &tables.triangles, &tables.materials, &tables.textures);
-    let value = bsdf.eval(light.wi);
-    let ratio = value.pdf / light.pdf;
-    let weight = one.or_else(light.is_delta, one / ratio.mul_add(ratio, one));
-    let arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
-    let sees = scatters & light.valid & si.is_outside(light.wi);
-    let broken = sees & !arriving.is_finite();
-    if broken.any() {
-        add_lanes::<L>(pool, slot, V3::splat([f32::NAN; 3]), broken);
-    }
-    let cast = sees & !broken & arriving.max_component().gt(zero);
-    let direction = light.wi.or_else(light.is_distant, light.end - start);
-    let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
-    pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);
-    cast
 }
 
 #[inline(always)]

@@ -44,6 +44,9 @@ pub struct Counters {
     pub shadow: u64,
     /// Paths ended by the safety cap.
     pub truncated: u64,
+    /// Crossings of volumes' boundaries that do not pair up: leaving what was not entered, being inside of something far
+    /// from everything, being inside of more than a path remembers.
+    pub unpaired: u64,
 }
 
 impl Counters {
@@ -71,6 +74,7 @@ impl PathTracer<'_> {
     /// it did before.
     pub fn trace(&self, unit: &Unit, worker: &mut Worker, sink: &mut impl SampleSink) {
         let Worker { pool, counters } = worker;
+        pool.fit(self.tables);
         let mut feed = Feed::new(unit);
         loop {
             let old = pool.n;
@@ -110,6 +114,9 @@ impl PathTracer<'_> {
 impl PathTracer<'_> {
     /// Adds what arrives along the queued shadow rays.
     fn shadow(&self, pool: &mut PathPool, counters: &mut Counters) {
+        if pool.glass.is_some() {
+            return self.shadow_through_glass(pool, counters);
+        }
         let n_shadow = pool.n_shadow;
         counters.shadow += n_shadow as u64;
         self.accel.occluded(&pool.shadow, n_shadow, &mut pool.occluded);
@@ -157,6 +164,7 @@ impl Feed {
                 for beta in &mut pool.beta {
                     beta[n] = 1.0;
                 }
+                pool.begin(n);
                 n += 1;
                 self.sample += 1;
             }

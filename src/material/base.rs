@@ -62,6 +62,8 @@ pub struct Base<'e, L: Lanes, const RICH: bool> {
     layer: [L::F; 2],
     through: Option<Through<L>>,
     film: Option<Film<L>>,
+    /// About the albedo towards the viewer.
+    albedo: L::F,
     /// Probability of sampling the specular lobes.
     specular_pmf: L::F,
     /// Of sampling the diffuse one on the other side.
@@ -151,6 +153,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             layer: [zero, zero],
             through: None,
             film: None,
+            albedo: base.scale(opaque).max_component(),
             specular_pmf: zero,
             behind_pmf: zero,
             is_delta,
@@ -183,7 +186,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         this.visible = Visible::all_in(sees_all, wo, ax, ay);
         // Albedos towards the viewer.
         this.row = energy.row::<L>((ax * ay).sqrt(), class);
-        let toward = this.albedo(wo);
+        let toward = this.albedo_toward(wo);
         let white = toward[0];
         let mean = this.mean();
         let mean_rise = this.row.mean_rise;
@@ -251,7 +254,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             }
         }
         // Shares of the albedo at this angle.
-        let mut reflected = metal_toward.scale(metallic * white) + layer_toward.scale(opaque * white);
+        let reflected = metal_toward.scale(metallic * white) + layer_toward.scale(opaque * white);
         let (mut passed, mut behind) = (V3::zero(), V3::zero());
         if RICH && let Some(through) = &this.through {
             passed = through.tint.scale(opaque * share * (one - layer_toward.max_component()));
@@ -259,7 +262,8 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         }
         let diffused = this.multiple.scale(one - mean) + this.diffuse.scale(one - shadowed_mean);
         let (s, d, b) = ((reflected + passed).max_component(), diffused.max_component(), behind.max_component());
-        let sum = (s + d + b).max(L::F::splat(1e-30));
+        this.albedo = s + d + b;
+        let sum = this.albedo.max(L::F::splat(1e-30));
         this.specular_pmf = (s / sum).min(one);
         this.behind_pmf = b / sum;
         base_closure
@@ -290,7 +294,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
 
     /// Albedo of GGX reflecting everything, and the rise of Fresnel's curve, towards `w` (w.z > 0).
     #[inline(always)]
-    fn albedo(&self, w: V3<L>) -> [L::F; 2] {
+    fn albedo_toward(&self, w: V3<L>) -> [L::F; 2] {
         if !self.is_full {
             return [L::F::one(), pow5(L::F::one() - w.z.min(L::F::one()))];
         }
@@ -428,7 +432,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         // What the layer leaves of the light that comes in, and gives back after the first reflection.
         let mut diffuse = self.diffuse;
         if self.is_full {
-            let albedo = self.albedo(up);
+            let albedo = self.albedo_toward(up);
             let under = self.under(up, albedo);
             diffuse = self.diffuse.scale(under) + self.multiple.scale(one - albedo[0]);
         } else {
@@ -485,7 +489,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let pdf = bent_pdf.or_else(through.is_volume, self.visible.pdf_reflected(d));
         let specular_pdf = (pdf * (one - self.reflects(reflected, passed))).masked(glossy);
         let cosine_pdf = ((-self.diffuse_cosine(wi)).max(zero) * L::F::splat(FRAC_1_PI)).masked(below);
-        let left = if self.is_full { self.under(flipped, self.albedo(flipped)) } else { one };
+        let left = if self.is_full { self.under(flipped, self.albedo_toward(flipped)) } else { one };
         let left = one.or_else(self.is_diffuse, left);
         let f_cos = through.diffuse.scale(left * cosine_pdf) + specular;
         let pdf = self.behind_pmf * cosine_pdf + self.specular_pmf * specular_pdf;
@@ -576,7 +580,13 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         }
     }
 
-    /// Albedo towards the viewer by which its sampling is weighed against other lobes.
+    /// About the albedo towards the viewer (largest channel), by which sampling it is weighed against other lobes.
+    #[inline(always)]
+    pub fn albedo(&self) -> L::F {
+        self.albedo
+    }
+
+    /// Whether some lane has more than a diffuse lobe.
     #[inline(always)]
     pub fn has_specular(&self) -> bool {
         self.has_specular || self.through.is_some()

@@ -78,7 +78,12 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
     /// The same, but for the lanes that are closures of their own.
     #[inline(always)]
     pub fn with_layered(self, layered: Vec<(usize, Layered<'e>)>) -> Self {
-        Self { layered, ..self }
+        let mut normals = Spread::of(self.frame.z);
+        for (lane, closure) in &layered {
+            normals.set(*lane, closure.frame().z);
+        }
+        // Nobody asks for the other axes of these lanes.
+        Self { frame: Frame { z: normals.join(), ..self.frame }, layered, ..self }
     }
 
     /// The same with the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the

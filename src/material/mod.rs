@@ -9,6 +9,7 @@ mod features;
 mod film;
 pub mod layered;
 pub mod lobes;
+pub mod media;
 pub mod surface;
 pub mod table;
 

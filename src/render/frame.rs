@@ -9,6 +9,10 @@ use crate::scene::Scene;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+/// Crossings of volumes' boundaries that do not pair up, a path, about which nothing is said: rays that slip through the
+/// edges of closed meshes are far fewer.
+const MOST_UNPAIRED: f64 = 1e-3;
+
 /// A rayon pool of `threads` threads (`None` = the cores this process may use) in which to [`render`].
 ///
 /// # Errors
@@ -100,6 +104,14 @@ pub fn render_prepared(
             .map(|(x, y, s)| format!("pixel {x},{y} sample {s} seed {}", settings.seed))
             .collect();
         warnings.push(format!("{} samples were not finite and were dropped: {}", totals.non_finite, places.join("; ")));
+    }
+    let unpaired = totals.counters.unpaired as f64 / paths as f64;
+    if unpaired > MOST_UNPAIRED {
+        warnings.push(format!(
+            "{:.1} % of the paths left a volume that they had not entered, or never left one: the camera is inside it, or \
+             its surface is open, where what it absorbs and refracts is a guess",
+            100.0 * unpaired
+        ));
     }
     let tables = &prepared.tables;
     let stats = RenderStats {

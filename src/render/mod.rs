@@ -12,6 +12,7 @@ mod pilot;
 mod placing;
 mod prepare;
 mod progress;
+mod refraction;
 mod schedule;
 mod settings;
 mod tracer;

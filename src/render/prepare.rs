@@ -5,16 +5,17 @@ use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::emission::mean_emissions;
 use super::opacity::Opacities;
 use super::placing::{Choice, Considered, Placing, Thing, rounded};
-use super::{AccelChoice, AccelReport, RenderSettings};
+use super::{AccelChoice, AccelReport, RenderSettings, refraction};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
 use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
-use crate::integrator::{Coverage, SceneTables};
+use crate::integrator::{Coverage, SceneTables, Spectrum};
 use crate::light::environment::EnvironmentTable;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
+use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::math::MAX_UV_SETS;
 use crate::scene::Scene;
@@ -220,8 +221,11 @@ fn prepare_all(
     if lights.is_empty() && environment.is_none() {
         warnings.push(default_light.darkness(scene));
     }
+    warnings.extend(refraction::lights_that_glass_hides(scene));
     let lights = LightTable::new(&lights, environment, &mut triangles);
-    let tables = Arc::new(SceneTables { triangles, placements, materials, textures, lights });
+    let media = MediumTable::new(&scene.materials);
+    let spectrum = media.has_dispersion().then(Spectrum::default);
+    let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
     let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
     geometry.filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(&tables))) as Arc<dyn HitFilter>);
     let (accel, accel_report) = build(geometry)?;

@@ -98,6 +98,7 @@ pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Total
         totals.counters.bounce += worker.counters.bounce;
         totals.counters.shadow += worker.counters.shadow;
         totals.counters.truncated += worker.counters.truncated;
+        totals.counters.unpaired += worker.counters.unpaired;
         totals.non_finite += non_finite;
         all.extend(examples);
     });

@@ -3,16 +3,19 @@
 //! | group | 0 | 1 | 2 | 3 |
 //! |---|---|---|---|---|
 //! | [`CAMERA`] | film x | film y | lens u | lens v |
-//! | [`TIME`] | time | - | - | - |
+//! | [`TIME`] | time | wavelength | - | - |
 //! | [`FIRST_LIGHT`] + 2k | choice of the light | point on it u | point on it v | spare (resampling) |
 //! | [`FIRST_BSDF`] + 2k | direction u | direction v | choice of the lobe | roulette |
 //!
-//! k counts the surface vertices of the path from 0. Groups stay fixed per vertex whether or not they are used.
+//! k counts the surface vertices of the path from 0, thin glass that it went straight through among them. Groups stay
+//! fixed per vertex whether or not they are used.
 
 /// Film position and lens.
 pub const CAMERA: u32 = 0;
 /// Shutter time.
 pub const TIME: u32 = 1;
+/// The wavelength of a path that dispersion splits, in the group [`TIME`].
+pub const WAVELENGTH: usize = 1;
 /// The light group of vertex 0.
 pub const FIRST_LIGHT: u32 = 2;
 /// The BSDF group of vertex 0.

@@ -1,0 +1,62 @@
+//! Next event estimation: a light, a point on it, and a shadow ray on the side where that is.
+
+use super::SceneTables;
+use super::closure::Closure;
+use super::interaction::Interaction;
+use super::medium::Crossing;
+use super::pool::PathPool;
+use super::shade::add_lanes;
+use crate::math::V3;
+use simd::{Float, Lanes, Mask};
+
+/// A vertex of N paths.
+pub(super) struct Vertex<'a, L: Lanes> {
+    pub si: &'a Interaction<L>,
+    pub closure: &'a Closure<'a, L>,
+    /// `None` in scenes without volumes.
+    pub crossing: Option<&'a Crossing<L>>,
+    /// Where rays start that are reflected.
+    pub start: V3<L>,
+    /// Throughput.
+    pub beta: V3<L>,
+    /// Where the paths' radiance is.
+    pub slot: L::U,
+}
+
+/// Queues a shadow ray with its finished contribution for a light chosen by `u`; the lanes of `scatters` that have one.
+#[inline(always)]
+pub(super) fn queue_light_sample<L: Lanes>(
+    tables: &SceneTables,
+    pool: &mut PathPool,
+    vertex: &Vertex<'_, L>,
+    u: [L::F; 3],
+    scatters: L::M,
+) -> L::M {
+    let Vertex { si, closure, crossing, start, beta, slot } = *vertex;
+    let (zero, one) = (L::F::zero(), L::F::one());
+    let light = tables.lights.sample::<L>(si.origin, u, &tables.triangles, &tables.materials, &tables.textures);
+    let value = closure.bsdf.eval(light.wi);
+    let ratio = value.pdf / light.pdf;
+    let weight = one.or_else(light.is_delta, one / ratio.mul_add(ratio, one));
+    let mut arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
+    let (through, proper) = closure.sides(tables, si, light.wi);
+    let sees = scatters & light.valid & proper;
+    let broken = sees & !arriving.is_finite();
+    if broken.any() {
+        add_lanes::<L>(pool, slot, V3::splat([f32::NAN; 3]), broken);
+    }
+    let mut start = start;
+    if tables.media.transmits() {
+        start = si.behind().or_else(through, start);
+    }
+    let to_light = light.end - start;
+    if let Some(crossing) = crossing {
+        arriving =
+            crossing.colored(arriving, through) * crossing.on_the_way(tables, light.is_distant, to_light, through);
+    }
+    let cast = sees & !broken & arriving.max_component().gt(zero);
+    let direction = light.wi.or_else(light.is_distant, to_light);
+    let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
+    pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);
+    cast
+}
