@@ -530,3 +530,40 @@ fn channels_that_a_slot_does_not_read_are_not_kept() {
     let all: Vec<Channels> = material(&load(&glossy)).channels().into_iter().map(|(_, channels)| channels).collect();
     assert_eq!(all, [Channels::A, Channels::RGB, Channels::RGB], "glossiness, emission, specular");
 }
+
+/// Khronos' sample assets of the extensions, as far as they are there.
+#[test]
+fn sample_assets_load_whole_and_have_what_they_are_named_for() {
+    type Has = fn(&Material) -> bool;
+    let assets: [(&str, Has); 9] = [
+        ("AnisotropyStrengthTest", Material::has_anisotropy),
+        ("AnisotropyDiscTest", Material::has_anisotropy),
+        ("AttenuationTest", |m| m.interior().is_some_and(|v| v.absorption() != [0.0; 3])),
+        ("ClearCoatTest", Material::has_coat),
+        ("ClearCoatCarPaint", Material::has_coat),
+        ("DispersionTest", Material::has_dispersion),
+        ("IridescenceSuzanne", Material::has_iridescence),
+        ("SheenChair", Material::has_sheen),
+        ("TransmissionTest", Material::has_transmission),
+    ];
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
+    for (name, has) in assets {
+        let mut folders = vec![folder.join(name)];
+        let mut files = 0;
+        while let Some(folder) = folders.pop() {
+            for path in std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|e| e == "gltf" || e == "glb") {
+                    let (scene, _) = prt::load::load(&path, &prt::load::LoadOptions::default()).unwrap();
+                    assert!(scene.losses.is_empty(), "{}: {:?}", path.display(), scene.losses);
+                    assert!(scene.materials.iter().any(has), "{}", path.display());
+                    files += 1;
+                }
+            }
+        }
+        if files == 0 {
+            println!("skipped: no {name} below {}", folder.display());
+        }
+    }
+}

@@ -98,7 +98,7 @@ fn evaluated<L: Lanes>(lobe: &Built<L>, wi: V3<L>) -> [L::F; 8] {
     let (value, scale, albedo) = match lobe {
         Built::Coat(c) => (c.eval(wi), c.scale(), V3::new(c.albedo(), c.albedo(), c.albedo())),
         Built::Sheen(s) => (s.eval(wi), s.scale(wi), s.albedo()),
-        Built::Disney(d) => (d.eval(wi), L::F::zero(), V3::zero()),
+        Built::Disney(d) => (d.eval(wi), L::F::zero(), d.albedo()),
     };
     [value.f_cos.x, value.f_cos.y, value.f_cos.z, value.pdf, scale, albedo.x, albedo.y, albedo.z]
 }
@@ -201,7 +201,7 @@ fn any_disney(rng: &mut Rng, edges: f32) -> Lobe {
 /// Disney materials of every kind, none of which is too narrow for angles.
 fn disneys() -> Vec<Lobe> {
     let mut rng = Rng::new(7, "disneys", 0);
-    let mut lobes: Vec<Lobe> = (0..24).map(|_| any_disney(&mut rng, 0.5)).collect();
+    let mut lobes: Vec<Lobe> = (0..12).map(|_| any_disney(&mut rng, 0.5)).collect();
     for lobe in &mut lobes {
         if let Lobe::Disney(p) = lobe {
             p.roughness = p.roughness.max(0.5);
@@ -269,7 +269,7 @@ fn bsdf_01_02_narrow_disney_lobes_are_sampled_by_their_density() {
         clearcoat_gloss: 1.0,
     };
     let stretched = Parameters { roughness: 0.15, anisotropic: 1.0, ..plain };
-    let coated = Parameters { base: [0.0; 3], metallic: 0.0, roughness: 1.0, clearcoat: 1.0, ..plain };
+    let coated = Parameters { base: [0.0; 3], metallic: 0.0, roughness: 0.04, clearcoat: 1.0, ..plain };
     let long = 0.15 * 0.15 / 0.1f64.sqrt();
     for (p, alpha) in [(plain, [0.001; 2]), (stretched, [long, 0.0225 * 0.1f64.sqrt()]), (coated, [0.001; 2])] {
         // Closer to the horizon than 0.01 the f32 numbers of a direction are 3 % of alpha and more apart in slope.
@@ -332,6 +332,12 @@ fn bsdf_05_disney_is_sampled_without_great_weights() {
             let found = furnace(&lobe, wo, 100, 6);
             greatest = greatest.max(found.albedo[0]).max(found.albedo[1]).max(found.albedo[2]);
             assert!(found.greatest < 60.0, "{lobe:?} from {wo:?}: {found:?}");
+            // The estimate leaves out masking, so rough metals and grazing angles are off.
+            let estimate = ask(Level::best(), lobe, wo, &[wo])[0].albedo;
+            if wo[2] >= 0.5 && matches!(lobe, Lobe::Disney(p) if p.metallic == 0.0) {
+                let is_near = (0..3).all(|k| (f64::from(estimate[k]) - found.albedo[k]).abs() < 0.4);
+                assert!(is_near, "{lobe:?} from {wo:?}: {found:?}, estimate {estimate:?}");
+            }
         }
     }
     assert!((0.5..4.0).contains(&greatest), "greatest albedo {greatest}");

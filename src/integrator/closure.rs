@@ -1,25 +1,26 @@
 //! What a surface does with light at a hit: textures applied, frames found, the evaluated closure.
 
 use super::SceneTables;
-use super::interaction::Interaction;
+use super::interaction::{Interaction, interact};
 use super::normals::{shading_normal, view};
+use crate::accel::HitBatch;
 use crate::material::bsdf::{Bsdf, View};
+use crate::material::layered::Layered;
 use crate::material::surface::Surface;
-use crate::math::V3;
 use crate::math::bend::let_mirror_leave;
-use simd::{Float, Lanes, Mask};
+use crate::math::{Frame, V3};
+use simd::{Float, Lanes, Mask, Scalar, Uint};
 
 /// A surface at a hit, all but directions known.
-pub(super) struct Closure<L: Lanes> {
-    pub bsdf: Bsdf<L>,
+pub(super) struct Closure<'t, L: Lanes> {
+    pub bsdf: Bsdf<'t, L>,
     /// Lanes from which light may get to the other side.
     pub transmits: L::M,
 }
 
-/// Textures and vertex colours applied.
+/// Vertex colours applied to a surface that has its textures.
 #[inline(always)]
-pub(super) fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Surface<L> {
-    let mut surface = tables.materials.surface(&tables.textures, si.triangle.material, &si.uvs, active);
+fn colored<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, mut surface: Surface<L>) -> Surface<L> {
     if tables.triangles.has_colors() {
         // Exporters write colours above 1; a base colour is a reflectance.
         surface.base = (surface.base * si.color).min(V3::splat([1.0; 3]));
@@ -27,31 +28,93 @@ pub(super) fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, activ
     surface
 }
 
-/// Textures applied, shading frame found: what is left is directions. `eta` as in [`View::eta`].
+/// Textures and vertex colours applied, without what only some materials have.
 #[inline(always)]
-pub(super) fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, eta: L::F, active: L::M) -> Closure<L> {
+pub(super) fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Surface<L> {
+    colored(tables, si, tables.materials.surface(&tables.textures, si.triangle.material, &si.uvs, active))
+}
+
+/// Textures applied, shading frame found: what is left is directions. `si` are the hits `at ..`; `eta` as in [`View::eta`].
+#[inline(always)]
+pub(super) fn closure<'t, L: Lanes>(
+    tables: &'t SceneTables,
+    hits: &HitBatch,
+    at: usize,
+    si: &Interaction<L>,
+    eta: L::F,
+    active: L::M,
+) -> Closure<'t, L> {
     let surface = surface(tables, si, active);
-    let zero = L::F::zero();
-    let transmits = match &surface.extras {
-        Some(e) => active & (e.transmission.gt(zero) | e.diffuse_transmission.gt(zero)),
-        None => L::M::from_bits(0),
-    };
-    let bsdf = if !tables.has_shading_normals() {
-        let view = View { eta, ..view(tables, si, &surface, si.ng, active) };
-        Bsdf::new(surface, view)
-    } else {
+    let energy = tables.materials.energy();
+    let bsdf = if tables.has_shading_normals() {
         let ns = shading_normal(tables, si, active);
         // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
         let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
         let low = low & active & surface.has_specular();
-        let view = View { eta, ..view(tables, si, &surface, bent.or_else(low, ns), active) };
-        let bsdf = Bsdf::new(surface, view);
+        let bsdf = Bsdf::new(&surface, &View::new(Frame::around(bent.or_else(low, ns)), si.wo), energy);
         if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
+    } else {
+        Bsdf::new(&surface, &View::new(Frame::around(si.ng), si.wo), energy)
     };
-    Closure { bsdf, transmits }
+    let none = L::M::from_bits(0);
+    if !tables.materials.has_extras() {
+        return Closure { bsdf, transmits: none };
+    }
+    let rich = tables.materials.rich::<L>(si.triangle.material, active);
+    if !rich.any() {
+        return Closure { bsdf, transmits: none };
+    }
+    let (mut wo, mut etas) = ([[0.0; 16]; 3], [0.0; 16]);
+    si.wo.x.store(&mut wo[0], 0);
+    si.wo.y.store(&mut wo[1], 0);
+    si.wo.z.store(&mut wo[2], 0);
+    eta.store(&mut etas, 0);
+    let (mut layered, mut transmits) = (Vec::with_capacity(rich.count()), 0);
+    let mut bits = rich.bits();
+    while bits != 0 {
+        let lane = bits.trailing_zeros() as usize;
+        bits &= bits - 1;
+        let wo = V3::splat([wo[0][lane], wo[1][lane], wo[2][lane]]);
+        let (one, goes_through) = closure_of_one(tables, hits, at + lane, wo, etas[lane]);
+        transmits |= u32::from(goes_through) << lane;
+        layered.push((lane, one));
+    }
+    Closure { bsdf: bsdf.with_layered(layered), transmits: L::M::from_bits(transmits) }
 }
 
-impl<L: Lanes> Closure<L> {
+/// The closure of hit `at` seen from `wo`, whose material has what only some have, and whether light may get through it.
+#[inline(never)]
+fn closure_of_one<'t>(
+    tables: &'t SceneTables,
+    hits: &HitBatch,
+    at: usize,
+    wo: V3<Scalar>,
+    eta: f32,
+) -> (Layered<'t>, bool) {
+    let active = <Scalar as Lanes>::M::first(1);
+    let primitive = <Scalar as Lanes>::U::load(&hits.primitive, at);
+    let si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    let materials = &tables.materials;
+    let surface = materials.rich_surface::<Scalar>(&tables.textures, si.triangle.material, &si.uvs, active);
+    let surface = colored(tables, &si, surface);
+    let zero = <Scalar as Lanes>::F::zero();
+    let transmits =
+        surface.extras.as_ref().is_some_and(|e| (e.transmission.gt(zero) | e.diffuse_transmission.gt(zero)).any());
+    let eta = <Scalar as Lanes>::F::splat(eta);
+    let (mut normal, mut diffuse_normal) = (si.ng, None);
+    if tables.has_shading_normals() {
+        let ns = shading_normal(tables, &si, active);
+        let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
+        normal = ns;
+        if (low & surface.has_specular()).any() {
+            (normal, diffuse_normal) = (bent, Some(ns));
+        }
+    }
+    let view = View { eta, ..view(tables, &si, &surface, normal, active) };
+    (Layered::new(&surface, &view, diffuse_normal, materials.energy()), transmits)
+}
+
+impl<L: Lanes> Closure<'_, L> {
     /// Lanes in which light from `wi` (or scattered to it) is light that goes through the surface, and those in which
     /// it does so or is reflected validly: on the proper side of both the geometric and the shading normal.
     #[inline(always)]

@@ -12,7 +12,7 @@ use simd::{Float, Lanes, Mask};
 /// A vertex of N paths.
 pub(super) struct Vertex<'a, L: Lanes> {
     pub si: &'a Interaction<L>,
-    pub closure: &'a Closure<L>,
+    pub closure: &'a Closure<'a, L>,
     /// `None` in scenes without volumes.
     pub crossing: Option<&'a Crossing<L>>,
     /// Where rays start that are reflected.

@@ -41,7 +41,7 @@ impl Patch {
         material.clearcoat.factor = Param::constant(1.0);
         material.anisotropy.strength = Param::constant(1.0);
         material.clearcoat.normal.texture = self.coat_texel.map(|_| TextureRef::plain(crate::id::TextureId(0)));
-        let materials = MaterialTable::new(&[material], &mut textures);
+        let materials = MaterialTable::new(&[material], &mut textures, crate::material::energy::Brdf::Full);
         let mut triangles = TriangleTable::default();
         let uvs = [[[0.0; 2], [1.0, 0.0], [0.0, 1.0]]];
         let corners = Corners { normals: Some([self.normal; 3]), uvs: &uvs, colors: None };
@@ -125,6 +125,9 @@ fn stretched_highlight_lies_in_the_plane_of_the_shading_normal() {
     let [x, y, z, _] = look(&flat(Some((Vec3::X, 1.0))), ns, [1.0, 0.0]);
     assert!((x - Vec3::new(0.8, 0.0, -0.6)).length() < 1e-6 && (y - Vec3::Y).length() < 1e-6, "{x} {y}");
     assert_eq!(z, ns);
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    let [between, ..] = look(&flat(Some((Vec3::X, 1.0))), ns, [half, half]);
+    assert!((between - (x + y) * half).length() < 1e-6, "angles are those of the plane: {between}");
 }
 
 #[test]

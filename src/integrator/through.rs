@@ -91,7 +91,7 @@ fn pass<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize, activ
         let si = interact::<L>(tables, &glass.hits, at, -direction.normalized(), primitive, hit);
         let thin = tables.media.is_thin_glass::<L>(MediumTable::inside::<L>(si.triangle.material), hit);
         if thin.any() {
-            let tint: V3<L> = closure(tables, &si, L::F::one(), thin).bsdf.straight();
+            let tint: V3<L> = closure(tables, &glass.hits, at, &si, L::F::one(), thin).bsdf.straight();
             let radiance = radiance * tint;
             let passes = thin & radiance.max_component().gt(L::F::zero());
             let origin = si.behind();

@@ -1,9 +1,13 @@
 //! Materials as described by the file, in glTF's names.
 
+mod base;
 pub mod bsdf;
 mod bump;
+pub mod energy;
 pub mod extensions;
 mod features;
+mod film;
+pub mod layered;
 pub mod lobes;
 pub mod media;
 pub mod surface;

@@ -178,10 +178,11 @@ pub fn pow5<F: Float>(v: F) -> F {
 pub fn exp<L: Lanes>(x: L::F) -> L::F {
     let f = |v: f32| L::F::splat(v);
     let x = x.max(f(-88.0)).min(f(88.0));
-    // x = n ln 2 + r with |r| <= ln 2 / 2, ln 2 in two parts.
+    // x = n ln 2 + r with |r| <= ln 2 / 2, ln 2 in two parts: products of n with the first are exact, fused or not.
     let n = (x * f(std::f32::consts::LOG2_E) + f(0.5)).floor();
-    let r = n.mul_add(f(1.428_606_8e-6), n.mul_add(f(-0.693_148_6), x));
-    let tail = r.mul_add(r.mul_add(f(1.0 / 720.0), f(1.0 / 120.0)), f(1.0 / 24.0));
+    let r = n.mul_add(f(2.121_944_4e-4), n.mul_add(f(-0.693_359_4), x));
+    let tail = r.mul_add(f(1.0 / 5040.0), f(1.0 / 720.0));
+    let tail = r.mul_add(r.mul_add(tail, f(1.0 / 120.0)), f(1.0 / 24.0));
     let p = r.mul_add(r.mul_add(r.mul_add(r.mul_add(tail, f(1.0 / 6.0)), f(0.5)), f(1.0)), f(1.0));
     let power = (n + f(127.0)).max(f(0.0)).to_uint().shl(23).to_float_bits();
     p * power

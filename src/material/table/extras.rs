@@ -159,6 +159,11 @@ impl MaterialTable {
         self.extras.has(STRETCHED)
     }
 
+    /// Whether there is a thin film on anything.
+    pub fn has_iridescence(&self) -> bool {
+        self.extras.has(IRIDESCENCE)
+    }
+
     /// Whether light goes through anything specularly.
     pub fn has_transmission(&self) -> bool {
         self.extras.has(TRANSMISSION)
@@ -283,7 +288,6 @@ impl MaterialTable {
             iridescence_thickness: L::F::splat(film.thickness_maximum.factor),
             transmission: zero,
             is_volume: active & flags.has(VOLUME),
-            ior: self.ior::<L>(material),
             dispersion: zero,
             diffuse_transmission: zero,
             diffuse_transmission_color: V3::splat([1.0; 3]),

@@ -2,6 +2,7 @@
 
 mod extras;
 
+use super::energy::{Brdf, Energy};
 use super::surface::Surface;
 use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
@@ -34,12 +35,13 @@ const EXTRAS_SHIFT: u32 = 8;
 /// | 4 | base texture | roughness | normal | specular |
 /// | 5 | specular colour texture | metallic, if it is not roughness' | opacity | bump |
 /// | 6 | alpha cutoff | bump height | bump without transform | - |
-/// | 7 | place in the table of extras | index of refraction | - | - |
+/// | 7 | place in the table of extras | index of refraction | number of its albedo tables | - |
 ///
 /// Textures are bindings of the scene's [`TextureTable`].
 #[derive(Clone, Debug, Default)]
 pub struct MaterialTable {
     records: Vec<[f32; 4]>,
+    energy: Energy,
     /// Some material has a texture other than normal, bump, opacity or emission.
     is_textured: bool,
     /// Some material emits.
@@ -58,13 +60,22 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// All materials of a scene, in order, their textures bound in `textures`; a scene without any gets the default one.
-    pub fn new(materials: &[Material], textures: &mut TextureTable) -> Self {
-        let mut table = Self::default();
+    pub fn new(materials: &[Material], textures: &mut TextureTable, brdf: Brdf) -> Self {
+        let mut table = Self { energy: Energy::new(brdf), ..Self::default() };
         for m in materials {
             table.push(m, textures);
         }
         if materials.is_empty() {
             table.push(&Material::default(), textures);
+        }
+        if table.has_volume() {
+            table.energy.add_glass();
+        }
+        if table.has_anisotropy() {
+            table.energy.add_stretched();
+        }
+        if table.has_iridescence() {
+            table.energy.add_film();
         }
         table
     }
@@ -100,7 +111,7 @@ impl MaterialTable {
             [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
             [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(bump)],
             [cutoff, m.bump.factor, id(plain_bump), 0.0],
-            [f32::from_bits(place), m.ior, 0.0, 0.0],
+            [f32::from_bits(place), m.ior, f32::from_bits(self.energy.class(m.ior)), 0.0],
         ]);
         let textures = [
             m.base_color.texture,
@@ -115,6 +126,11 @@ impl MaterialTable {
         self.has_unlit |= m.unlit;
         self.has_bump |= bump.is_some();
         self.has_glossy |= is_glossy;
+    }
+
+    /// The albedos that its surfaces are compensated by.
+    pub fn energy(&self) -> &Energy {
+        &self.energy
     }
 
     /// Whether anything emits at all.
@@ -220,7 +236,7 @@ impl MaterialTable {
         (factor * texel.rgb).or_else(textured, factor)
     }
 
-    /// The parameters of reflection and transmission at texture coordinates `uvs`.
+    /// The parameters that every material has at texture coordinates `uvs`.
     #[inline(always)]
     pub fn surface<L: Lanes>(
         &self,
@@ -230,6 +246,7 @@ impl MaterialTable {
         active: L::M,
     ) -> Surface<L> {
         let [r, g, b, _] = self.record::<L>(material, 0);
+        let [_, ior, class, _] = self.record::<L>(material, 7);
         let [metallic, roughness, specular, _] = self.record::<L>(material, 1);
         let [f0r, f0g, f0b, _] = self.record::<L>(material, 2);
         let mut s = Surface {
@@ -238,6 +255,8 @@ impl MaterialTable {
             roughness,
             specular,
             f0: V3::<L>::new(f0r, f0g, f0b),
+            ior,
+            class: class.to_bits(),
             extras: None,
         };
         if self.is_textured {
@@ -283,8 +302,26 @@ impl MaterialTable {
             let glossy = self.record::<L>(material, 0)[3].to_bits().has(GLOSSY);
             s.base = s.base.scale(L::F::one() - s.f0.max_component()).or_else(glossy, s.base);
         }
-        s.extras = self.extras(textures, material, uvs, active);
         s
+    }
+
+    /// [`MaterialTable::surface`] with what only some materials have.
+    #[inline(always)]
+    pub fn rich_surface<L: Lanes>(
+        &self,
+        textures: &TextureTable,
+        material: L::U,
+        uvs: &UvSets<L>,
+        active: L::M,
+    ) -> Surface<L> {
+        let extras = self.extras(textures, material, uvs, active);
+        Surface { extras, ..self.surface(textures, material, uvs, active) }
+    }
+
+    /// The lanes of `active` whose material has what only some have.
+    #[inline(always)]
+    pub fn rich<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
+        active & (self.record::<L>(material, 0)[3].to_bits().shr(EXTRAS_SHIFT)).has(extras::ANY)
     }
 
     /// `roughness` with the texel `t` applied, which holds roughness in G or glossiness in A.

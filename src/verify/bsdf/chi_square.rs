@@ -7,7 +7,7 @@
 use super::domain::Domain;
 use super::statistics::chi_square_tail;
 use super::{Scatterer, direction};
-use crate::verify::rng::Rng;
+use crate::math::random::Rng;
 
 /// How much is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -62,11 +62,11 @@ impl ChiSquare {
 pub fn chi_square(scatterer: &dyn Scatterer, wo: [f32; 3], domain: Domain, settings: Settings) -> ChiSquare {
     let Settings { samples, cells, seed } = settings;
     let view = wo.map(f64::from);
-    let mut rng = Rng::new(seed, "chi_square", 0);
+    let mut rng = Rng::of_stream(seed, "chi_square", 0);
     let u: Vec<[f32; 3]> = (0..samples).map(|_| [rng.unit(), rng.unit(), rng.unit()]).collect();
     let directions: Vec<[f32; 3]> =
         scatterer.sample(wo, &u).into_iter().flatten().filter(|s| s.pdf.is_finite()).map(|s| s.wi).collect();
-    let impossible = scatterer.eval(wo, &directions).iter().filter(|e| !(e.pdf > 0.0)).count();
+    let impossible = scatterer.eval(wo, &directions).iter().filter(|e| e.pdf.is_nan() || e.pdf <= 0.0).count();
     let mut counts = vec![0.0; cells * cells];
     let mut elsewhere = samples as f64;
     for wi in directions {
@@ -121,6 +121,9 @@ struct Patch {
     depth: u32,
 }
 
+/// Patches are split so often whatever they say: slivers of a lobe in the corner of a cell are not to be missed.
+const SHALLOWEST: u32 = 2;
+
 /// Deeper than this a patch is taken as it is: 1/256 of a cell's side.
 const DEEPEST: u32 = 8;
 
@@ -153,7 +156,7 @@ fn integrate(scatterer: &dyn Scatterer, wo: [f32; 3], domain: Domain, cells: usi
             // Not finite: no splitting helps.
             let error = (sum[0] - whole.estimate[0]).abs() * samples;
             let limit = 0.2 * (sum[0] * samples).max(1.0).sqrt() / f64::from(1 << whole.depth);
-            if error > limit && whole.depth < DEEPEST {
+            if whole.depth < SHALLOWEST || (error > limit && whole.depth < DEEPEST) {
                 open.extend(parts);
             } else {
                 sums[whole.cell].iter_mut().zip(sum).for_each(|(s, v)| *s += v);

@@ -69,7 +69,7 @@ mod tests {
             assert!((chi_square_tail(x, dof) / p - 1.0).abs() < 1e-6, "{x} of {dof}: {}", chi_square_tail(x, dof));
         }
         // The median is near dof - 2/3.
-        assert!((chi_square_tail(1999.333_4, 2000) - 0.5).abs() < 1e-4);
+        assert!((chi_square_tail(1_999.333_4, 2000) - 0.5).abs() < 1e-4);
         assert_eq!(chi_square_tail(3.0, 0), 1.0);
     }
 
