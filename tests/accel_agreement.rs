@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 use meshes::{batch, grid, placed, random_soup, slivers, soup, sphere};
 use prt::accel::front::{Front, Split};
 use prt::accel::linear::Linear;
-use prt::accel::wide::WideBvh;
+use prt::accel::wide::{SpatialSplits, WideBvh};
 use prt::accel::{Accel, HitBatch, MISS, Triangles};
 use rng::Rng;
 use simd::Level;
@@ -42,6 +42,9 @@ fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
             all.push((name, Box::new(Front::new(big, behind, bounds).with_level(level))));
         }
     }
+    let split = WideBvh::with_splits(triangles, Level::best(), SpatialSplits::Always);
+    split.validate(triangles).expect("a sound tree");
+    all.push(("with splits", Box::new(split)));
     all
 }
 

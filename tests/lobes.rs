@@ -14,7 +14,7 @@ use prt::verify::bsdf::chi_square::{Settings, chi_square, views};
 use prt::verify::bsdf::domain::Domain;
 use prt::verify::bsdf::statistics::sidak;
 use prt::verify::bsdf::{Evaluated, Sampled, Scatterer, direction};
-use prt::verify::rng::Rng;
+use prt::math::random::Rng;
 use published_disney::{Parameters, brdf};
 use simd::{Float, Kernel, Lanes, Level, Mask, dispatch};
 
@@ -200,7 +200,7 @@ fn any_disney(rng: &mut Rng, edges: f32) -> Lobe {
 
 /// Disney materials of every kind, none of which is too narrow for angles.
 fn disneys() -> Vec<Lobe> {
-    let mut rng = Rng::new(7, "disneys", 0);
+    let mut rng = Rng::of_stream(7, "disneys", 0);
     let mut lobes: Vec<Lobe> = (0..12).map(|_| any_disney(&mut rng, 0.5)).collect();
     for lobe in &mut lobes {
         if let Lobe::Disney(p) = lobe {
@@ -283,7 +283,7 @@ fn bsdf_01_02_narrow_disney_lobes_are_sampled_by_their_density() {
 
 #[test]
 fn disney_is_the_published_brdf_within_1e_4() {
-    let mut rng = Rng::new(11, "published", 0);
+    let mut rng = Rng::of_stream(11, "published", 0);
     let (mut points, mut worst) = (0, 0.0f64);
     for set in 0..4000 {
         let lobe = any_disney(&mut rng, [0.0, 0.5, 1.0][set % 3]);
@@ -388,7 +388,7 @@ fn bsdf_05_lobes_reflect_what_their_tables_say_and_never_more_than_comes() {
 
 #[test]
 fn bsdf_10_lobes_are_finite_at_their_edges() {
-    let mut rng = Rng::new(13, "edges", 0);
+    let mut rng = Rng::of_stream(13, "edges", 0);
     let disneys: Vec<Lobe> = (0..60).map(|_| any_disney(&mut rng, 0.8)).collect();
     for (i, lobe) in coats().chain(sheens()).chain(disneys).enumerate() {
         let faults = finiteness(&lobe, 100, 60, i as u64);

@@ -267,15 +267,53 @@ fn bvh_01_everything_together() {
 }
 
 #[test]
-fn placements_that_cannot_be_met_are_left_out() {
-    let with = With { placements: 6, ..With::default() };
-    let mut all = geometry(with, 71);
+fn inst_02_all_backends_leave_out_the_same_placements_and_count_them() {
+    let scaled = |s: f32| Affine { columns: [Vec3::X * s, Vec3::Y * s, Vec3::Z * s], translation: Vec3::ZERO };
     let flat = Affine { columns: [Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], translation: Vec3::ZERO };
     let nan = Affine { columns: [Vec3::NAN, Vec3::Y, Vec3::Z], translation: Vec3::ZERO };
-    all.placements[1].keys = vec![flat];
-    all.placements[4].keys = vec![nan];
-    let rays = rays(2000, &mut Rng::new(72));
-    let want = trace("linear", &Linear::new(all.clone()), &rays, 2000);
-    assert!(want.iter().all(|hit| hit.0 != 2 && hit.0 != 5));
-    assert!(trace("bvh", &WideBvh::build(all), &rays, 2000) == want);
+    let far = Affine { translation: Vec3::X * 1e38, ..scaled(1e-3) };
+    let refused = [flat, nan, far, scaled(0.0), scaled(1e-20), scaled(-2.2e-13), scaled(7.1e12), scaled(1e15)];
+    // In the middle of the world, each as large as what rays are aimed at: an object of 1e12 m made small, and so on.
+    let taken = [1.0, -0.7, 1e-6, 3e-13, 1e6, 6e12];
+    let mut all = geometry(With { placements: 2, ..With::default() }, 71);
+    let object = all.objects[0].clone();
+    all.objects.clear();
+    all.placements.clear();
+    for s in taken {
+        let mut object = object.clone();
+        for p in object.parts.iter_mut().flat_map(|part| &mut part.triangles.positions) {
+            *p = p.map(|x| x / s);
+        }
+        all.objects.push(object);
+        let at = 3.0 * direction(&mut Rng::new(all.objects.len() as u64));
+        let keys = vec![Affine { translation: at, ..scaled(s) }];
+        all.placements.push(Placement { object: all.objects.len() as u32 - 1, keys });
+        // One that is refused after each, and one that is refused at its second key alone.
+        let bad = refused[all.objects.len()];
+        all.placements.push(Placement { object: 0, keys: vec![bad] });
+        all.placements.push(Placement { object: 0, keys: vec![scaled(1.0), bad] });
+    }
+    all.placements.extend(refused.map(|bad| Placement { object: 0, keys: vec![bad] }));
+    assert_eq!(all.unusable_placements(), 2 * taken.len() + refused.len());
+    let rays = rays(3000, &mut Rng::new(72));
+    let want = trace("linear", &Linear::new(all.clone()), &rays, 3000);
+    let of = |found: &[Found], instance: u32| found.iter().filter(|hit| hit.1 != MISS && hit.0 == instance).count();
+    let counts: Vec<usize> = (0..all.placements.len() as u32).map(|i| of(&want, i + 1)).collect();
+    for (i, &count) in counts.iter().enumerate() {
+        let is_taken = i < 3 * taken.len() && i % 3 == 0;
+        assert!(if is_taken { count > 5 } else { count == 0 }, "placement {i} is hit {count} times");
+    }
+    assert!(trace("bvh", &WideBvh::build(all.clone()), &rays, 3000) == want);
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(".embree");
+    match EmbreeAccel::build(all, &[folder]) {
+        Ok(embree) => {
+            let got = trace("embree", &embree, &rays, 3000);
+            // How well it hits objects of 1e-13 or 1e12 m is another matter: which it knows is asked here.
+            let found: Vec<usize> = (0..counts.len() as u32).map(|i| of(&got, i + 1)).collect();
+            println!("hits on each placement: {counts:?}, by Embree {found:?}");
+            let left_out = |all: &[usize]| all.iter().map(|&n| n == 0).collect::<Vec<_>>();
+            assert_eq!(left_out(&found), left_out(&counts), "by Embree {found:?}, by the others {counts:?}");
+        }
+        Err(why) => println!("skipped: no Embree library ({why})"),
+    }
 }

@@ -6,13 +6,13 @@ use prt::accel::geometry::Geometry;
 use prt::accel::linear::Linear;
 use prt::accel::wide::WideBvh;
 use prt::accel::{Accel, AccelStats, HitBatch, MISS, RayBatch, Triangles};
+use prt::math::random::Rng;
 use prt::verify::catalogue::{ENTRIES, Entry, Subject};
 use prt::verify::contenders::{Backend, Contender};
 use prt::verify::hits::{Settings, hits, hits_of};
 use prt::verify::oracle::Oracle;
 use prt::verify::rays::{Aim, Kind, Ray};
 use prt::verify::report::{Fault, Report, SubjectReport};
-use prt::verify::rng::Rng;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -150,7 +150,7 @@ fn the_search_of_the_oracle_finds_what_looking_at_everything_finds() {
         let mut found = 0;
         // Of far rays so many triangles are within the error bound that the oracle gives up, in the order of its search.
         for kind in Kind::ALL.into_iter().filter(|kind| *kind != Kind::Far) {
-            for ray in aim.rays(kind, 25, &mut Rng::new(3, name, kind as u64)) {
+            for ray in aim.rays(kind, 25, &mut Rng::of_stream(3, name, kind as u64)) {
                 let (fast, slow) = (fast.must(&ray), slow.must(&ray));
                 assert_eq!(fast.map(|m| m.t), slow.map(|m| m.t), "{name}, {kind:?}: {ray:?}");
                 found += usize::from(fast.is_some());
@@ -214,7 +214,7 @@ const ULPS: f64 = 16.0 / (1 << 23) as f64;
 
 #[test]
 fn geo04_hits_of_well_shaped_triangles_are_accurate_at_every_scale() {
-    let mut rng = Rng::new(4, "geo04", 0);
+    let mut rng = Rng::of_stream(4, "geo04", 0);
     for exponent in -6..=7 {
         let s = 10f32.powi(exponent);
         let (mut mesh, mut rays) = (Triangles::default(), Vec::new());

@@ -5,8 +5,11 @@ from random import Random
 from .dense import Dense, ball, cable, cube_sphere, height_field, knot, rotation, turned, vase
 from .gltf_file import GltfFile
 from .shapes import panel, smooth_run
+from .vector import cross, sub, unit
 
 FLAT = ("normals", "uvs", "tangents")
+# The sides of a box whose corner k is bit by bit across, over and along.
+BEAM = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6))
 
 
 class Stage:
@@ -209,4 +212,62 @@ def drone():
     parts.placed(ball(32, 20), (0.0, -0.16, 0.22), 0.09)
     stage.put("machine", parts, (0.35, 0.37, 0.4))
     stage.file.camera("main", (1.35, 0.75, 1.4), (0, -0.02, 0), 48)
+    return stage.file
+
+
+def rafters():
+    """A timber hall that stands askew: beams, braces, stairs and wires, long, thin and diagonal, and a jug of small triangles."""
+    random, stage = Random(11), Stage("rafters")
+    askew, beams, wires = turned(33), Dense(), Dense()
+
+    def beam(into, start, stop, width, depth):
+        """Twelve triangles from `start` to `stop`, whatever the length."""
+        along = unit(sub(stop, start))
+        side = unit(cross(along, (0.13, 0.11, 1.0)))
+        over = cross(side, along)
+        corners = []
+        for k in range(8):
+            s, o, end = width * ((k & 1) - 0.5), depth * ((k >> 1 & 1) - 0.5), stop if k & 4 else start
+            corners += [e + side[i] * s + over[i] * o for i, e in enumerate(end)]
+        into.add(corners, [i for a, b, c, d in BEAM for i in (a, b, c, a, c, d)])
+
+    for k in range(61):
+        z = -12 + 0.4 * k
+        for x in (-1, 1):
+            beam(beams, (x * 6.2, 2.6, z), (0, 7.2, z), 0.08, 0.18)
+            beam(beams, (x * 3.0, 2.9, z), (x * 1.2, 6.2, z), 0.05, 0.1)
+            beam(beams, (x * 3.0, 2.9, z), (x * 4.4, 3.9, z), 0.05, 0.1)
+            beam(beams, (x * 5.9, 0, z), (x * 5.9, 2.7, z), 0.12, 0.12)
+            if k:
+                beam(beams, (x * 5.95, 0, z - 0.4), (x * 5.95, 2.6, z), 0.03, 0.1)
+        beam(beams, (-6, 2.8, z), (6, 2.8, z), 0.07, 0.16)
+    for k in range(44):
+        s = k / 43
+        for x in (-1, 1):
+            beam(beams, (x * 6.2 * (1 - s), 2.72 + 4.6 * s, -12), (x * 6.2 * (1 - s), 2.72 + 4.6 * s, 12), 0.04, 0.05)
+    for flight in range(6):
+        z = -9 + 3.4 * flight
+        for x in (-2.6, -1.4):
+            beam(beams, (x, 0, z), (x, 2.8, z + 2.9), 0.05, 0.24)
+            beam(beams, (x, 0.95, z), (x, 3.75, z + 2.9), 0.04, 0.06)
+        for k in range(16):
+            y, at = 0.175 * (k + 0.5), z + 0.181 * (k + 0.5)
+            beam(beams, (-2.6, y, at), (-1.4, y, at), 0.26, 0.03)
+            for x in (-2.6, -1.4):
+                beam(beams, (x, y, at), (x, y + 0.95, at), 0.015, 0.015)
+    for k in range(2500):
+        start = (12 * random.random() - 6, 2.8 + 0.4 * random.random(), 24 * random.random() - 12)
+        stop = [c + 7 * (random.random() - 0.5) * f for c, f in zip(start, (1, 0.5, 1))]
+        beam(wires, start, stop, 0.004 + 0.008 * random.random(), 0.006)
+    for k in range(400):
+        at, lean = (10 * random.random() - 5, 0, 22 * random.random() - 11), (random.random() - 0.5, 2.4, random.random() - 0.5)
+        beam(beams, at, [a + b for a, b in zip(at, lean)], 0.06, 0.03)
+    hall = Dense().placed(beams, turn=askew)
+    stage.put("timber", hall, (0.45, 0.3, 0.18))
+    stage.put("wires", Dense().placed(wires, turn=askew), (0.3, 0.3, 0.33))
+    floor = Dense().box((-7, -0.2, -13), (7, 0, 13))
+    stage.put("floor", Dense().placed(floor, turn=askew), (0.5, 0.48, 0.45))
+    stage.put("jug", Dense().placed(vase(profile(URN, 200), 160, 9, 0.05), (1.0, 0.0, 0.5)), (0.5, 0.35, 0.3))
+    stage.file.light("sun", "directional", 8.0, at=(0, 500, 0), target=(210, 0, 130))
+    stage.file.camera("main", (6.58, 1.7, 8.84), (-2.93, 2.9, -2.86), 62)
     return stage.file

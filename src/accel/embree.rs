@@ -87,6 +87,7 @@ impl EmbreeAccel {
             time: self.built.moves.then(|| &rays.time[range.clone()]),
             id: self.built.is_filtered.then(|| &rays.key[range]),
             mask: None,
+            is_open: true,
         }
     }
 }
@@ -94,7 +95,9 @@ impl EmbreeAccel {
 fn ray(rays: &RayBatch, i: usize) -> Ray {
     let origin = [rays.ox[i], rays.oy[i], rays.oz[i]];
     let direction = [rays.dx[i], rays.dy[i], rays.dz[i]];
-    Ray { t_max: rays.t_max[i], time: rays.time[i], id: rays.key[i], ..Ray::new(origin, direction) }
+    // Embree counts hits at the ends.
+    let (t_min, t_max) = (f32::MIN_POSITIVE, rays.t_max[i].next_down());
+    Ray { t_min, t_max, time: rays.time[i], id: rays.key[i], ..Ray::new(origin, direction) }
 }
 
 /// Where Embree says which instance was hit.
@@ -171,6 +174,7 @@ impl Accel for EmbreeAccel {
             isa: device.isa().to_owned(),
             bytes: device.memory_bytes(),
             front: 0,
+            splits: 0,
         }
     }
 }

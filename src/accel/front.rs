@@ -10,7 +10,7 @@
 //! it (exact), and the nearest of several hits is chosen by `T / det`. Corners shared by triangles are sheared once.
 
 use super::geometry::{Geometry, Part, Primitives};
-use super::woop::{can_be_hit, exact_edges};
+use super::woop::{can_be_hit, exact_edges_of, in_doubt};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use simd::{Float, Kernel, Lanes, Level, Mask, Uint, dispatch};
 use std::cell::RefCell;
@@ -394,13 +394,14 @@ fn cross<L: Lanes>(sheared: &Sheared<L>, ids: [u16; 3], active: L::M, t_max: L::
     if !inside.any() {
         return None;
     }
-    if (inside & (e0.eq(zero) | e1.eq(zero) | e2.eq(zero))).any() {
-        e0 = exact_edges::<L>(e0, cx, by, cy, bx);
-        e1 = exact_edges::<L>(e1, ax, cy, ay, cx);
-        e2 = exact_edges::<L>(e2, bx, ay, by, ax);
+    let mut det = (e0 + e1) + e2;
+    let around = [[ax, ay], [bx, by], [cx, cy]];
+    let doubtful = inside & in_doubt::<L>(around, [e0, e1, e2], det);
+    if doubtful.any() {
+        [e0, e1, e2] = exact_edges_of::<L>(around, [e0, e1, e2], doubtful.bits());
         inside = inside & one_side::<L>(e0, e1, e2);
+        det = (e0 + e1) + e2;
     }
-    let det = (e0 + e1) + e2;
     let t = ((e0 * at + e1 * bt) + e2 * ct) / det;
     let slack = at.abs().max(bt.abs()).max(ct.abs()) * L::F::splat(CLOSE);
     let mut crossing = Crossing::<L> { t, slack, edges: [e0, e1, e2], corners: [at, bt, ct], inside };

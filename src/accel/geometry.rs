@@ -137,9 +137,16 @@ impl Affine {
         inverse.is_finite().then_some(inverse)
     }
 
-    /// Whether it is finite and has a finite inverse.
+    /// Whether it can be inverted in f32: the inverse is finite, and so are the cofactors and the determinant on the way,
+    /// which must not be below the least normal number either. Embree inverts so, and all backends must leave out the same
+    /// placements. Of uniform scales those from 2.3e-13 to 6.9e12 are usable.
     pub fn is_usable(&self) -> bool {
-        self.is_finite() && self.inverse().is_some()
+        let [x, y, z] = self.columns.map(Vec3::as_dvec3);
+        let cofactors = [y.cross(z), z.cross(x), x.cross(y)];
+        let (least, most) = (f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX));
+        // Written so that NaN is refused.
+        let fits = cofactors.iter().all(|row| row.abs().max_element() <= most);
+        self.is_finite() && fits && (least..=most).contains(&x.dot(cofactors[0]).abs()) && self.inverse().is_some()
     }
 
     fn is_finite(&self) -> bool {
@@ -148,7 +155,7 @@ impl Affine {
 }
 
 impl Placement {
-    /// Whether it has a finite inverse at every key.
+    /// Whether it is usable at every key; where not, all backends leave it out.
     pub fn is_usable(&self) -> bool {
         self.keys.iter().all(Affine::is_usable)
     }
@@ -340,6 +347,11 @@ impl Geometry {
         self.world.bounds().into_iter().chain(placed).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
     }
 
+    /// Placements that all backends leave out.
+    pub fn unusable_placements(&self) -> usize {
+        self.placements.iter().filter(|placement| !placement.is_usable()).count()
+    }
+
     /// Triangles held, each object once.
     pub fn triangle_count(&self) -> usize {
         let of = |object: &Object| object.parts.iter().map(|part| part.triangles.indices.len()).sum::<usize>();
@@ -383,8 +395,11 @@ mod tests {
         assert!((map.inverse().unwrap().point(map.point(p)) - p).length() < 1e-5);
         let flat = Affine { columns: [Vec3::X, Vec3::Y, Vec3::X + Vec3::Y], translation: Vec3::ZERO };
         assert!(!flat.is_usable());
-        let tiny = Affine { columns: [Vec3::X * 1e-20, Vec3::Y * 1e-20, Vec3::Z * 1e-20], translation: Vec3::ONE };
-        assert!(tiny.is_usable());
+        let scaled = |s: f32| Affine { columns: [Vec3::X * s, Vec3::Y * s, Vec3::Z * s], translation: Vec3::ONE };
+        assert!([2.3e-13, -1e-12, 1.0, 6.9e12].map(scaled).iter().all(Affine::is_usable));
+        assert!(![2.2e-13, -1e-14, 0.0, 7.1e12, -1e14].map(scaled).iter().any(Affine::is_usable));
+        // The determinant is 1e-9, but the origin goes to 1e38 / 1e-9.
+        assert!(!Affine { translation: Vec3::X * 1e38, ..scaled(1e-3) }.is_usable());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Brute force as an [`super::Accel`]: the oracle of the tests, and nothing else.
 
-use super::geometry::{Affine, Candidate, Geometry, Object, Part, Shape, ShapeRay};
+use super::geometry::{Affine, Candidate, Geometry, Object, Part, Placement, Shape, ShapeRay};
 use super::woop::{ShearedRay, can_be_hit};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use glam::Vec3;
@@ -10,6 +10,8 @@ use std::ops::{ControlFlow, Range};
 #[derive(Clone)]
 pub struct Linear {
     geometry: Geometry,
+    /// Of each placement.
+    usable: Vec<bool>,
 }
 
 /// A crossing with t in (0, t_max) that the filter lets count.
@@ -25,7 +27,9 @@ struct Found {
 impl Linear {
     /// Nothing is built.
     pub fn new(geometry: impl Into<Geometry>) -> Self {
-        Self { geometry: geometry.into() }
+        let geometry = geometry.into();
+        let usable = geometry.placements.iter().map(Placement::is_usable).collect();
+        Self { geometry, usable }
     }
 
     /// What is tested.
@@ -44,7 +48,9 @@ impl Linear {
             return ControlFlow::Continue(());
         }
         self.in_object(&geometry.world, 0, &ray, rays.key[i], &mut each)?;
-        for (placement, instance) in geometry.placements.iter().zip(1..) {
+        for ((placement, instance), _) in
+            geometry.placements.iter().zip(1..).zip(&self.usable).filter(|(_, usable)| **usable)
+        {
             let Some(object_from_world) = placement.at(ray.time).inverse() else { continue };
             let ray = ray_in_object(&object_from_world, &ray);
             self.in_object(&geometry.objects[placement.object as usize], instance, &ray, rays.key[i], &mut each)?;
@@ -125,6 +131,6 @@ impl Accel for Linear {
         };
         let object = |o: &Object| o.parts.iter().map(part).sum::<usize>();
         let bytes = object(&self.geometry.world) + self.geometry.objects.iter().map(object).sum::<usize>();
-        AccelStats { name: "linear", version: String::new(), isa: "scalar".into(), bytes, front: 0 }
+        AccelStats { name: "linear", isa: "scalar".into(), bytes, ..AccelStats::default() }
     }
 }

@@ -51,6 +51,8 @@ pub struct AccelStats {
     pub bytes: usize,
     /// Big triangles that are tested by packets of rays before the backend.
     pub front: usize,
+    /// Spatial splits of `bvh`: entries in leaves beyond one for each triangle.
+    pub splits: usize,
 }
 
 /// A built acceleration structure. Called once per batch of about 2000 rays, so `dyn` costs nothing here.

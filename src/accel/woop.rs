@@ -4,13 +4,23 @@
 //! operation here is a plain IEEE operation in a fixed order, no FMA, so that both give the same bits.
 //!
 //! Deviations from the paper:
-//! - Only the edge functions that are exactly zero are re-evaluated in f64, not all three: an edge's value then depends
-//!   on that edge and the ray alone, so both triangles that share it always agree about its sign.
+//! - Edge functions are re-evaluated in f64 not only where one is exactly zero, but also where they are small against
+//!   the products that they are differences of ([`THIN`]). What the products were rounded by would else move the hit
+//!   along a sliver: of 5 m x 3 mm, by 1e-4 of the way, past the offset of rays that leave it. Both triangles that share
+//!   an edge still agree about its sign, since an f32 value that is not zero has the sign of the exact one.
 //! - `t` is the sum of the corners' distances weighted by the normalised edge functions, instead of `T / det` with a
 //!   range test before the division: coordinates of 1e18 do not overflow, and `t` stays within the triangle's own range.
 
 use glam::Vec3;
 use simd::{Float, Lanes};
+
+/// Edge functions are re-evaluated where their sum is this share or less of the products that they are differences of:
+/// where a triangle is about as many times as long as wide, as the ray sees it.
+///
+/// Heights of hits above the plane of slivers of 5 m, in 2^-24 of the largest coordinate, of which the offset of rays that
+/// leave is 16: 39 at worst with 100:1 (then 31 of a million rays come back), 800 with 1700:1 (33,000 come back); with 1/16
+/// never more than 9, and none comes back. 1/128: 48. 1/8: 5. Paired on three scenes: costs nothing that can be measured.
+const THIN: f32 = 1.0 / 16.0;
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,15 +90,15 @@ impl ShearedRay {
         if !one_side(e0, e1, e2) {
             return None;
         }
-        if e0 == 0.0 || e1 == 0.0 || e2 == 0.0 {
-            e0 = exact_edge(e0, cx, by, cy, bx);
-            e1 = exact_edge(e1, ax, cy, ay, cx);
-            e2 = exact_edge(e2, bx, ay, by, ax);
+        let mut det = (e0 + e1) + e2;
+        let products = ((cx * by).abs() + (ax * cy).abs()) + (bx * ay).abs();
+        if e0 == 0.0 || e1 == 0.0 || e2 == 0.0 || det.abs() <= products * THIN {
+            [e0, e1, e2] = exact_edges([[ax, ay], [bx, by], [cx, cy]]);
             if !one_side(e0, e1, e2) {
                 return None;
             }
+            det = (e0 + e1) + e2;
         }
-        let det = (e0 + e1) + e2;
         let (w, u, v) = (e0 / det, e1 / det, e2 / det);
         let t = (w * at + u * bt) + v * ct;
         (!t.is_nan()).then_some(Crossing { t, u, v })
@@ -108,27 +118,44 @@ fn one_side(e0: f32, e1: f32, e2: f32) -> bool {
     (e0 >= 0.0 && e1 >= 0.0 && e2 >= 0.0) || (e0 <= 0.0 && e1 <= 0.0 && e2 <= 0.0)
 }
 
-/// `a * b - c * d` with the right sign, if `edge`, its f32 value, is zero.
+/// The edge functions of sheared corners, each rounded once: the products of two f32 are exact in f64, so their
+/// difference has the sign of the exact one.
 #[inline(always)]
-fn exact_edge(edge: f32, a: f32, b: f32, c: f32, d: f32) -> f32 {
-    // Products of two f32 are exact in f64, so the difference has the sign of the exact one.
-    if edge == 0.0 { (f64::from(a) * f64::from(b) - f64::from(c) * f64::from(d)) as f32 } else { edge }
+fn exact_edges([a, b, c]: [[f32; 2]; 3]) -> [f32; 3] {
+    [exact_edge(c, b), exact_edge(a, c), exact_edge(b, a)]
 }
 
-/// [`exact_edge`] in every lane. Rare (rays through edges and corners), so scalar.
 #[inline(always)]
-pub(super) fn exact_edges<L: Lanes>(edge: L::F, a: L::F, b: L::F, c: L::F, d: L::F) -> L::F {
-    let mut lanes = [[0.0; 16]; 5];
-    edge.store(&mut lanes[0], 0);
-    a.store(&mut lanes[1], 0);
-    b.store(&mut lanes[2], 0);
-    c.store(&mut lanes[3], 0);
-    d.store(&mut lanes[4], 0);
-    let [mut edge, a, b, c, d] = lanes;
-    for i in 0..L::N {
-        edge[i] = exact_edge(edge[i], a[i], b[i], c[i], d[i]);
+fn exact_edge([px, py]: [f32; 2], [qx, qy]: [f32; 2]) -> f32 {
+    (f64::from(px) * f64::from(qy) - f64::from(py) * f64::from(qx)) as f32
+}
+
+/// Lanes whose edge functions `edges` (of sheared `corners`, in the order of [`exact_edges`]) must be re-evaluated: any
+/// of them is zero, or they are what cancellation left. `det` is their sum.
+#[inline(always)]
+pub(super) fn in_doubt<L: Lanes>(corners: [[L::F; 2]; 3], edges: [L::F; 3], det: L::F) -> L::M {
+    let [[ax, ay], [_, by], [cx, cy]] = corners;
+    let (bx, [e0, e1, e2], zero) = (corners[1][0], edges, L::F::zero());
+    let products = ((cx * by).abs() + (ax * cy).abs()) + (bx * ay).abs();
+    e0.eq(zero) | e1.eq(zero) | e2.eq(zero) | det.abs().le(products * L::F::splat(THIN))
+}
+
+/// `edges` with those of the lanes `doubtful` (bits) re-evaluated. Rare, so one lane after the other.
+#[inline(always)]
+pub(super) fn exact_edges_of<L: Lanes>(corners: [[L::F; 2]; 3], edges: [L::F; 3], mut doubtful: u32) -> [L::F; 3] {
+    let (mut at, mut out) = ([[0.0; 16]; 6], [[0.0; 16]; 3]);
+    for i in 0..3 {
+        corners[i][0].store(&mut at[2 * i], 0);
+        corners[i][1].store(&mut at[2 * i + 1], 0);
+        edges[i].store(&mut out[i], 0);
     }
-    L::F::load(&edge, 0)
+    while doubtful != 0 {
+        let i = doubtful.trailing_zeros() as usize % 16;
+        doubtful &= doubtful - 1;
+        let [ax, ay, bx, by, cx, cy] = [at[0][i], at[1][i], at[2][i], at[3][i], at[4][i], at[5][i]];
+        [out[0][i], out[1][i], out[2][i]] = exact_edges([[ax, ay], [bx, by], [cx, cy]]);
+    }
+    [L::F::load(&out[0], 0), L::F::load(&out[1], 0), L::F::load(&out[2], 0)]
 }
 
 #[cfg(test)]
@@ -162,7 +189,7 @@ mod tests {
     fn exact_edge_finds_the_sign_that_f32_loses() {
         let (a, b) = (1.0 + f32::EPSILON, 1.0 - f32::EPSILON);
         assert_eq!(a * b - 1.0, 0.0);
-        assert!(exact_edge(0.0, a, b, 1.0, 1.0) < 0.0);
+        assert!(exact_edge([a, 1.0], [1.0, b]) < 0.0);
     }
 
     #[test]

@@ -66,6 +66,8 @@ pub struct Explanation {
     pub accel_note: String,
     /// Big triangles tested by packets of rays before the backend.
     pub front_triangles: Option<u64>,
+    /// Entries in the leaves of `bvh` beyond one for each triangle: it cut long diagonal ones where that pays.
+    pub split_references: Option<u64>,
     pub features: BTreeMap<String, bool>,
     pub triangles: Option<TrianglePlan>,
     pub meshes: Option<usize>,
@@ -446,6 +448,7 @@ fn describe_prepared(scene: &Scene, prepared: &Prepared, plan: &mut Explanation)
     (plan.accel.version, plan.accel.isa) = (some(&accel.version), some(&accel.isa));
     plan.accel_note.clone_from(&accel.note);
     plan.front_triangles = Some(accel.front_triangles);
+    plan.split_references = Some(accel.splits);
     plan.features = features(scene, prepared).into_iter().map(|(name, has)| (name.into(), has)).collect();
     if let Some(triangles) = &mut plan.triangles {
         (triangles.traced, triangles.stored) = (prepared.placed.triangles, prepared.placed.stored);

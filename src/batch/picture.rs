@@ -93,6 +93,7 @@ fn attributes(
 /// The option's value that names a model.
 fn brdf_name(brdf: Brdf) -> &'static str {
     match brdf {
+        Brdf::Full => "full",
         Brdf::AppendixB => "appendix-b",
     }
 }

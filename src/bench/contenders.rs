@@ -148,6 +148,8 @@ pub struct BuildRow {
     pub bytes: usize,
     /// The same by triangle.
     pub bytes_per_triangle: f64,
+    /// Entries in leaves beyond one for each triangle: spatial splits, of `bvh` alone.
+    pub split_references: usize,
 }
 
 /// Times builds, backends in turn.
@@ -198,6 +200,7 @@ pub fn time_builds(
             ratio_to_embree: embree.map(ratio),
             bytes: stats[i].bytes,
             bytes_per_triangle: stats[i].bytes as f64 / triangles,
+            split_references: stats[i].splits,
         }
     };
     Ok(timed.iter().enumerate().map(row).collect())

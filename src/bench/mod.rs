@@ -7,7 +7,6 @@
 mod agreement;
 mod clock;
 mod contenders;
-mod random;
 mod rays;
 mod report;
 mod rounds;

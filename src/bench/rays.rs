@@ -1,6 +1,5 @@
 //! The rays that are timed: what the renderer sends for a scene, and random chords.
 
-use super::random::Random;
 use super::surface::SurfacePoint;
 use crate::accel::geometry::Geometry;
 use crate::accel::{Accel, HitBatch, RayBatch};
@@ -8,6 +7,7 @@ use crate::camera::{Camera, CameraRays, PixelFilter};
 use crate::film::TILE;
 use crate::integrator::POOL;
 use crate::math::V3;
+use crate::math::random::Rng;
 use crate::render::Prepared;
 use crate::sampler::{Key, dims, pixel_seed};
 use glam::Vec3;
@@ -194,7 +194,7 @@ fn surface_points(geometry: &Geometry, accel: &dyn Accel, set: &RaySet) -> Vec<S
 }
 
 fn chords([low, high]: [Vec3; 2], n: usize, seed: u64) -> Vec<(Vec3, Vec3, f32)> {
-    let mut random = Random::new(seed, 1);
+    let mut random = Rng::of_stream(seed, "bench", 1);
     let mut point = || low + (high - low) * Vec3::new(random.unit(), random.unit(), random.unit());
     let mut rays = Vec::with_capacity(n);
     while rays.len() < n {
@@ -206,7 +206,7 @@ fn chords([low, high]: [Vec3; 2], n: usize, seed: u64) -> Vec<(Vec3, Vec3, f32)>
 }
 
 fn bounces(points: &[SurfacePoint], n: usize, seed: u64) -> Vec<(Vec3, Vec3, f32)> {
-    let mut random = Random::new(seed, 2);
+    let mut random = Rng::of_stream(seed, "bench", 2);
     let mut rays = Vec::with_capacity(n);
     while rays.len() < n {
         for point in points.iter().take(n - rays.len()) {
@@ -221,7 +221,7 @@ fn bounces(points: &[SurfacePoint], n: usize, seed: u64) -> Vec<(Vec3, Vec3, f32
 /// Rays to points that the renderer would choose on the scene's lights; where no light reaches any of the points,
 /// towards a dome over them.
 fn towards_lights(prepared: &Prepared, points: &[SurfacePoint], n: usize, seed: u64) -> Vec<(Vec3, Vec3, f32)> {
-    let mut random = Random::new(seed, 3);
+    let mut random = Rng::of_stream(seed, "bench", 3);
     let mut rays = Vec::with_capacity(n);
     if !prepared.tables.lights.is_empty() {
         let mut samples = LightSamples::default();
@@ -273,7 +273,7 @@ impl Default for LightSamples {
 }
 
 impl LightSamples {
-    fn choose(&mut self, prepared: &Prepared, points: &[SurfacePoint], random: &mut Random) {
+    fn choose(&mut self, prepared: &Prepared, points: &[SurfacePoint], random: &mut Rng) {
         for (i, point) in points.iter().enumerate() {
             for axis in 0..3 {
                 self.from[axis][i] = point.p[axis];

@@ -183,16 +183,16 @@ fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) ->
 
 /// Textures applied, shading frame found: what is left is directions.
 #[inline(always)]
-fn closure<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<L> {
+fn closure<'t, L: Lanes>(tables: &'t SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<'t, L> {
     let surface = surface(tables, si, active);
     if !tables.has_shading_normals() {
-        return Bsdf::new(surface, View::new(Frame::around(si.ng), si.wo));
+        return Bsdf::new(&surface, &View::new(Frame::around(si.ng), si.wo), tables.materials.energy());
     }
     let ns = shading_normal(tables, si, active);
     // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
     let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
     let low = low & active & surface.has_specular();
-    let bsdf = Bsdf::new(surface, View::new(Frame::around(bent.or_else(low, ns)), si.wo));
+    let bsdf = Bsdf::new(&surface, &View::new(Frame::around(bent.or_else(low, ns)), si.wo), tables.materials.energy());
     if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
 }
 
@@ -203,7 +203,7 @@ fn queue_light_sample<L: Lanes>(
     tables: &SceneTables,
     pool: &mut PathPool,
     si: &Interaction<L>,
-    bsdf: &Bsdf<L>,
+    bsdf: &Bsdf<'_, L>,
     start: V3<L>,
     beta: V3<L>,
     slot: L::U,

@@ -1,8 +1,11 @@
 //! Sampling, density and value of the closure against each other, over a grid of surfaces and directions.
 
 use super::*;
+use crate::material::energy::Brdf;
+use crate::math::lanes::cos_sin_2pi;
 use crate::math::lanes::tests::at_all_levels;
-use simd::{Kernel, Uint};
+use simd::{Kernel, Mask, Uint};
+use std::sync::LazyLock;
 
 /// Surfaces (base, metallic, roughness, specular) and view cosines: corners and middles.
 fn grid() -> Vec<([f32; 4], f32)> {
@@ -19,8 +22,15 @@ fn grid() -> Vec<([f32; 4], f32)> {
     cells
 }
 
+/// Tables of index 1.5.
+static ENERGY: LazyLock<Energy> = LazyLock::new(|| {
+    let mut energy = Energy::new(Brdf::Full);
+    energy.class(1.5);
+    energy
+});
+
 #[inline(always)]
-fn bsdf<L: Lanes>([base, metallic, roughness, specular]: [f32; 4], cos: f32) -> Bsdf<L> {
+fn bsdf<L: Lanes>([base, metallic, roughness, specular]: [f32; 4], cos: f32) -> Bsdf<'static, L> {
     let f = |v: f32| L::F::splat(v);
     let surface = Surface {
         base: V3::<L>::splat([base, base * 0.5, 0.0]),
@@ -28,10 +38,12 @@ fn bsdf<L: Lanes>([base, metallic, roughness, specular]: [f32; 4], cos: f32) -> 
         roughness: f(roughness),
         specular: f(specular),
         f0: V3::<L>::splat([0.04; 3]),
+        ior: f(1.5),
+        class: L::U::splat(0),
         extras: None,
     };
     let wo = V3::<L>::splat([(1.0 - cos * cos).sqrt(), 0.0, cos]);
-    Bsdf::new(surface, View::new(Frame::around(V3::splat([0.0, 0.0, 1.0])), wo))
+    Bsdf::new(&surface, &View::new(Frame::around(V3::splat([0.0, 0.0, 1.0])), wo), &ENERGY)
 }
 
 /// The first lane.
@@ -75,7 +87,7 @@ fn bsdf_03_sample_weight_and_pdf_are_those_of_eval() {
 
 /// The same with the diffuse lobe about a normal `tilt` radians off, towards azimuth 1.
 #[inline(always)]
-fn split<L: Lanes>(surface: [f32; 4], cos: f32, tilt: f32) -> Bsdf<L> {
+fn split<L: Lanes>(surface: [f32; 4], cos: f32, tilt: f32) -> Bsdf<'static, L> {
     let (sin, z) = tilt.sin_cos();
     let normal = V3::<L>::splat([sin * 1f32.cos(), sin * 1f32.sin(), z]);
     bsdf::<L>(surface, cos).with_diffuse_normal(normal, L::M::first(L::N))

@@ -1,8 +1,12 @@
 //! Materials as described by the file, in glTF's names.
 
+mod base;
 pub mod bsdf;
 mod bump;
+pub mod energy;
 pub mod extensions;
+mod film;
+pub mod layered;
 pub mod lobes;
 pub mod surface;
 pub mod table;

@@ -15,6 +15,10 @@ pub struct Surface<L: Lanes> {
     pub specular: L::F,
     /// Dielectric reflectance at normal incidence with its colour, in [0, 1].
     pub f0: V3<L>,
+    /// Index of refraction, >= 1; 0: fully reflecting.
+    pub ior: L::F,
+    /// Number of the index' tables, [`super::energy::Energy::class`].
+    pub class: L::U,
     /// What only some materials have; `None` where no lane has any of it.
     pub extras: Option<Extras<L>>,
 }
@@ -44,8 +48,6 @@ pub struct Extras<L: Lanes> {
     pub transmission: L::F,
     /// The surface is the boundary of a volume: light is refracted; else it is thin-walled.
     pub is_volume: L::M,
-    /// Index of refraction of the material, >= 1; 0: fully reflecting.
-    pub ior: L::F,
     /// `dispersion`: 20 / Abbe number.
     pub dispersion: L::F,
     /// `diffuseTransmissionFactor`, in [0, 1].
@@ -79,9 +81,13 @@ pub struct DisneyExtras<L: Lanes> {
 }
 
 impl<L: Lanes> Surface<L> {
-    /// The lanes that have more than the diffuse lobe.
+    /// The lanes that have more than diffuse lobes.
     #[inline(always)]
     pub fn has_specular(&self) -> L::M {
-        self.metallic.gt(L::F::zero()) | self.specular.gt(L::F::zero())
+        let reflects = self.metallic.gt(L::F::zero()) | self.specular.gt(L::F::zero());
+        match &self.extras {
+            Some(extras) => reflects | extras.transmission.gt(L::F::zero()),
+            None => reflects,
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Materials as shading reads them, and their textures applied.
 
+use super::energy::{Brdf, Energy};
 use super::surface::Surface;
 use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
@@ -15,6 +16,9 @@ const BLEND: u32 = 8;
 const UNLIT: u32 = 16;
 /// The metallic texture is the roughness texture, as always in glTF.
 const METALLIC_WITH_ROUGHNESS: u32 = 32;
+
+/// The number of the index of refraction's tables stands above the flags.
+const CLASS_SHIFT: u32 = 16;
 
 /// Seven 16-byte records a material.
 ///
@@ -32,6 +36,7 @@ const METALLIC_WITH_ROUGHNESS: u32 = 32;
 #[derive(Clone, Debug, Default)]
 pub struct MaterialTable {
     records: Vec<[f32; 4]>,
+    energy: Energy,
     /// Some material has a texture other than normal, bump, opacity or emission.
     is_textured: bool,
     /// Some material emits.
@@ -46,8 +51,8 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// All materials of a scene, in order, their textures bound in `textures`; a scene without any gets the default one.
-    pub fn new(materials: &[Material], textures: &mut TextureTable) -> Self {
-        let mut table = Self::default();
+    pub fn new(materials: &[Material], textures: &mut TextureTable, brdf: Brdf) -> Self {
+        let mut table = Self { energy: Energy::new(brdf), ..Self::default() };
         for m in materials {
             table.push(m, textures);
         }
@@ -69,6 +74,7 @@ impl MaterialTable {
         let flags =
             [(m.double_sided, DOUBLE_SIDED), (emits, EMISSIVE), (m.unlit, UNLIT), (shares, METALLIC_WITH_ROUGHNESS)];
         let flags = flags.iter().filter(|f| f.0).fold(alpha, |bits, f| bits | f.1);
+        let flags = flags | self.energy.class(m.ior) << CLASS_SHIFT;
         let ([r, g, b], [er, eg, eb]) = (m.base_color.factor, m.emission.factor);
         // KHR_materials_ior: ior 0 stands for infinite, which reflects everything.
         let reflectance = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
@@ -97,6 +103,11 @@ impl MaterialTable {
         self.has_alpha |= alpha != 0;
         self.has_unlit |= m.unlit;
         self.has_bump |= bump.is_some();
+    }
+
+    /// The albedos that its surfaces are compensated by.
+    pub fn energy(&self) -> &Energy {
+        &self.energy
     }
 
     /// Whether anything emits at all.
@@ -205,7 +216,9 @@ impl MaterialTable {
         uvs: &UvSets<L>,
         active: L::M,
     ) -> Surface<L> {
-        let [r, g, b, _] = self.record::<L>(material, 0);
+        let [r, g, b, flags] = self.record::<L>(material, 0);
+        let class = flags.to_bits().shr(CLASS_SHIFT);
+        let ior = self.energy.ior::<L>(class);
         let [metallic, roughness, specular, _] = self.record::<L>(material, 1);
         let [f0r, f0g, f0b, _] = self.record::<L>(material, 2);
         let mut s = Surface {
@@ -214,6 +227,8 @@ impl MaterialTable {
             roughness,
             specular,
             f0: V3::<L>::new(f0r, f0g, f0b),
+            ior,
+            class,
             extras: None,
         };
         if self.is_textured {

@@ -1,11 +1,12 @@
 //! Vectors over lanes, frames, angles, discrete distributions, shading normals kept usable, rounding bounds and ray
-//! origins. glam serves everything scalar.
+//! origins, random numbers for what tests and measures. glam serves everything scalar.
 
 pub mod angle;
 pub mod bend;
 pub mod distribution;
 mod frame;
 pub mod lanes;
+pub mod random;
 pub mod robust;
 mod uv;
 

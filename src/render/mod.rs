@@ -53,6 +53,8 @@ pub struct AccelReport {
     pub note: String,
     /// Big triangles tested by packets of rays before the backend.
     pub front_triangles: u64,
+    /// Parts that `bvh` cut long diagonal triangles into, beyond one each.
+    pub splits: u64,
 }
 
 /// Counts and times of one frame.

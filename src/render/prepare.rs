@@ -164,7 +164,7 @@ fn prepare_all(
     }
     let (bounds, origin) = (boxes.scene, boxes.origin());
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
-    let materials = MaterialTable::new(&scene.materials, &mut textures);
+    let materials = MaterialTable::new(&scene.materials, &mut textures, settings.brdf);
     let mut triangles = TriangleTable::with_capacity(count as usize);
     let mut parts = Parts::default();
     let mut lights = Vec::new();
@@ -485,6 +485,7 @@ pub fn build_accel(
 
 /// What is said about the backend in use.
 fn report(accel: &dyn Accel, requested: &'static str, note: String) -> AccelReport {
-    let AccelStats { name, version, isa, front, .. } = accel.stats();
-    AccelReport { requested, used: name, version, isa, note, front_triangles: front as u64 }
+    let AccelStats { name, version, isa, front, splits, .. } = accel.stats();
+    let (front_triangles, splits) = (front as u64, splits as u64);
+    AccelReport { requested, used: name, version, isa, note, front_triangles, splits }
 }

@@ -1,5 +1,6 @@
 //! What a picture depends on beside the scene.
 
+pub use crate::material::energy::Brdf;
 use std::path::PathBuf;
 
 /// Which ray backend.
@@ -26,14 +27,6 @@ pub enum DefaultLight {
     On,
     /// Never.
     Off,
-}
-
-/// Which microfacet model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Brdf {
-    /// The single-scattering formulas of glTF 2.0 appendix B with height-correlated G.
-    #[default]
-    AppendixB,
 }
 
 /// Pixel filter, sampled by importance; `width` is its full support in pixels.

@@ -2,11 +2,11 @@
 
 use super::meshes::{cuboid, grid, joined, placed, random_soup, slivers, soup, sphere};
 use super::rays::Inside;
-use super::rng::Rng;
 use crate::accel::Triangles;
 use crate::accel::geometry::{
     Affine, Candidate, Geometry, HitFilter, Object, Part, Placement, Primitives, Shape, ShapeHit, ShapeRay,
 };
+use crate::math::random::Rng;
 use glam::{Mat3, Quat, Vec3};
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub struct Entry {
 impl Entry {
     /// The mesh, always the same.
     pub fn subject(&self) -> Subject {
-        (self.build)(&mut Rng::new(0, self.name, 0))
+        (self.build)(&mut Rng::of_stream(0, self.name, 0))
     }
 }
 
@@ -31,8 +31,9 @@ pub struct Subject {
     pub geometry: Geometry,
     /// Where rays that start inside of a closed mesh do so; `None` if it is not closed, or not known to be.
     pub inside: Option<Inside>,
-    /// Backends may disagree about hit or miss of 2 in a million usual rays. Not so where triangles are no larger than the
-    /// error bound (slivers, coordinates far from the origin): there boundaries are everywhere.
+    /// Backends may disagree about hit or miss of 2 in a million usual rays. Not so where Embree catches rays that leave
+    /// slivers (`slivers`, `needles`: 1 to 10 of 100), where the scene is so much larger than a triangle that the error
+    /// bound is as large (`mixed-scales`: 40 of a million) and where triangles are 2 ulp of their coordinates (`sphere-far`).
     pub is_ordinary: bool,
 }
 
@@ -42,11 +43,11 @@ const FAR: Vec3 = Vec3::new(148_376.0, 1234.0, -223_423.0);
 /// The table.
 pub const ENTRIES: &[Entry] = &[
     Entry { name: "bumpy", build: |_| bumpy_at(1.0, Vec3::ZERO) },
-    Entry { name: "bumpy-far", build: |_| adverse(bumpy_at(1.0, FAR)) },
+    Entry { name: "bumpy-far", build: |_| bumpy_at(1.0, FAR) },
     Entry { name: "bumpy-small", build: |_| bumpy_at(1e-6, Vec3::ZERO) },
-    Entry { name: "bumpy-small-far", build: |_| adverse(bumpy_at(1e-6, FAR)) },
+    Entry { name: "bumpy-small-far", build: |_| bumpy_at(1e-6, FAR) },
     Entry { name: "bumpy-large", build: |_| bumpy_at(1e6, Vec3::ZERO) },
-    Entry { name: "bumpy-large-far", build: |_| adverse(bumpy_at(1e6, FAR)) },
+    Entry { name: "bumpy-large-far", build: |_| bumpy_at(1e6, FAR) },
     Entry { name: "sphere", build: |_| closed(sphere(100, 200, || 2.0), Vec3::ZERO, 0.5) },
     Entry { name: "sphere-far", build: |_| adverse(closed(placed(&sphere(100, 200, || 2.0), 1.0, FAR), FAR, 0.5)) },
     Entry { name: "room", build: room },
@@ -57,7 +58,7 @@ pub const ENTRIES: &[Entry] = &[
     Entry { name: "needles", build: |rng| adverse(open(slivers(2000, 1e3, rng))) },
     Entry { name: "stadium", build: stadium },
     Entry { name: "flat", build: flat },
-    Entry { name: "copies", build: |rng| adverse(copies(rng)) },
+    Entry { name: "copies", build: copies },
     Entry { name: "mixed-scales", build: |rng| adverse(mixed_scales(rng)) },
     Entry { name: "cutout", build: cutout },
     Entry { name: "moving", build: moving },
@@ -82,7 +83,7 @@ fn closed(geometry: impl Into<Geometry>, centre: Vec3, radius: f32) -> Subject {
 
 /// pbrt's closed mesh of bumps: 16 x 16, radii 1 to 6.
 fn bumpy() -> Triangles {
-    let mut rng = Rng::new(12111, "bumpy", 0);
+    let mut rng = Rng::of_stream(12111, "bumpy", 0);
     sphere(16, 16, || 1.0 + 5.0 * rng.unit())
 }
 

@@ -69,11 +69,6 @@ impl Contender {
         !self.is_coherent || self.backend != Backend::Embree || kind == Kind::Camera
     }
 
-    /// Whether hits lie strictly between the ends of a ray, as `accel::Accel` has it; Embree includes them.
-    pub fn keeps_off_ends(&self) -> bool {
-        self.backend != Backend::Embree
-    }
-
     /// Traces `rays`, each twice.
     pub fn ask(&self, rays: &[Ray]) -> Answers {
         let rays_in = batch(rays);

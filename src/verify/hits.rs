@@ -5,9 +5,9 @@ use super::contenders::{Answers, Backend, Contender, contenders};
 use super::oracle::{Must, Oracle, Reported, Wrong};
 use super::rays::{Aim, Kind, Ray};
 use super::report::{Fault, KindReport, Reproducer, SubjectReport, Tally};
-use super::rng::Rng;
 use crate::accel::MISS;
 use crate::error::RenderError;
+use crate::math::random::Rng;
 use rayon::prelude::*;
 use std::path::PathBuf;
 
@@ -59,7 +59,7 @@ pub fn hits_of(name: &str, subject: &Subject, contenders: &[Contender], settings
     let jobs: Vec<(Kind, usize)> = Kind::ALL.iter().flat_map(|kind| (0..chunks).map(|c| (*kind, c))).collect();
     let shot = |&(kind, chunk): &(Kind, usize)| {
         let stream = format!("{name} {}", kind.name());
-        let mut rng = Rng::new(settings.seed, &stream, chunk as u64);
+        let mut rng = Rng::of_stream(settings.seed, &stream, chunk as u64);
         let n = CHUNK.min(settings.rays - chunk * CHUNK);
         let rays = aim.rays(kind, n, &mut rng);
         judge(name, kind, &rays, contenders, &oracle)
@@ -87,7 +87,7 @@ fn judge(name: &str, kind: Kind, rays: &[Ray], contenders: &[Contender], oracle:
             let hit = reported(answers, i);
             tally.hits += usize::from(hit.is_some());
             let ends = |hit: &Reported| hit.t == 0.0 || hit.t == ray.t_max;
-            let at_end = contender.keeps_off_ends() && hit.as_ref().is_some_and(ends);
+            let at_end = hit.as_ref().is_some_and(ends);
             let mut faults = vec![fault(oracle, ray, musts[i], hit).or(at_end.then_some(Fault::Phantom))];
             all_allowed &= faults[0].is_none();
             if (answers.occluded[i] != 0) != hit.is_some() {

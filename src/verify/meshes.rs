@@ -1,7 +1,7 @@
 //! Shapes of the built-in meshes.
 
-use super::rng::Rng;
 use crate::accel::Triangles;
+use crate::math::random::Rng;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 

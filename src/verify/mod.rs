@@ -13,4 +13,3 @@ pub mod meshes;
 pub mod oracle;
 pub mod rays;
 pub mod report;
-pub mod rng;

@@ -1,8 +1,8 @@
 //! The rays: such as pictures need, and such as break ray tracers.
 
-use super::rng::Rng;
 use crate::accel::RayBatch;
 use crate::accel::geometry::{Geometry, Object};
+use crate::math::random::Rng;
 use crate::math::robust::offset_origin;
 use glam::Vec3;
 use serde::Serialize;

@@ -66,6 +66,7 @@ pub fn trace(folder: &str) -> Result<Option<[u32; 3]>, Box<dyn Error>> {
         time: Some(&[0.0, 0.0, 1.0]),
         id: None,
         mask: None,
+        is_open: false,
     };
     let [mut t, mut u, mut v] = [[0.0; 3]; 3];
     let [mut primitive, mut geometry, mut instance] = [[0; 3]; 3];

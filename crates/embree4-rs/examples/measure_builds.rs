@@ -102,6 +102,7 @@ fn hits(scene: &CommittedScene, seed: u32) -> u64 {
         time: None,
         id: None,
         mask: None,
+        is_open: false,
     };
     let into = HitsSoAMut {
         t: &mut t,

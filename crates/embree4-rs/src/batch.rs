@@ -1,11 +1,11 @@
 //! Queries for any number of rays in structure-of-arrays form, cut into the device's native packets.
 
 use crate::query::Coherence;
-use crate::raw::QueryArguments;
+use crate::raw::{INVALID_ID, QueryArguments};
 use crate::ray::{Mask, RayHitPacket, RayPacket};
 use crate::scene::CommittedScene;
 
-/// Rays with `t` in [0, `t_max`]; all slices have the same length.
+/// Rays with `t` in [0, `t_max`], or between the two; all slices have the same length.
 #[derive(Clone, Copy, Debug)]
 pub struct RaysSoA<'a> {
     /// Origins, x.
@@ -28,6 +28,9 @@ pub struct RaysSoA<'a> {
     pub id: Option<&'a [u32]>,
     /// Ray masks; `None` is every bit for all.
     pub mask: Option<&'a [u32]>,
+    /// Whether hits at exactly 0 and `t_max` do not count: Embree, which counts both, is told of the least normal number
+    /// and the float before `t_max`. Filters and shapes see that end.
+    pub is_open: bool,
 }
 
 impl RaysSoA<'_> {
@@ -69,6 +72,10 @@ impl RaysSoA<'_> {
         copy_in(&mut packet.direction_y, self.dy, start, count);
         copy_in(&mut packet.direction_z, self.dz, start, count);
         copy_in(&mut packet.t_max, self.t_max, start, count);
+        if self.is_open {
+            packet.t_min = [f32::MIN_POSITIVE; N];
+            packet.t_max = packet.t_max.map(f32::next_down);
+        }
         if let Some(time) = self.time {
             copy_in(&mut packet.time, time, start, count);
         }
@@ -154,9 +161,17 @@ impl CommittedScene {
     ) {
         let mut packet = RayHitPacket::<N>::default();
         let (mut instance, mut instance_primitive) = (hits.instance, hits.instance_primitive);
+        let is_open = rays.is_open;
         for (start, count, valid) in packets::<N>(rays.len()) {
             rays.load(start, count, &mut packet.ray);
             self.intersect_packet(&valid, &mut packet, arguments);
+            if is_open {
+                // What hit nothing keeps its own end.
+                for (lane, t_max) in rays.t_max[start..start + count].iter().enumerate() {
+                    let is_miss = packet.hit.primitive[lane] == INVALID_ID;
+                    packet.ray.t_max[lane] = if is_miss { *t_max } else { packet.ray.t_max[lane] };
+                }
+            }
             copy_out(hits.t, start, count, &packet.ray.t_max);
             copy_out(hits.u, start, count, &packet.hit.u);
             copy_out(hits.v, start, count, &packet.hit.v);

@@ -178,8 +178,19 @@ fn slices_of_different_lengths_panic() {
     let scene = scene_of(&device, [triangle()]);
     let two = [0.0; 2];
     let dy = &two[..1];
-    let rays =
-        RaysSoA { ox: &two, oy: &two, oz: &two, dx: &two, dy, dz: &two, t_max: &two, time: None, id: None, mask: None };
+    let rays = RaysSoA {
+        ox: &two,
+        oy: &two,
+        oz: &two,
+        dx: &two,
+        dy,
+        dz: &two,
+        t_max: &two,
+        time: None,
+        id: None,
+        mask: None,
+        is_open: false,
+    };
     scene.occluded_batch(rays, false, &mut [0; 2]);
 }
 

@@ -21,6 +21,7 @@ mod lanes;
 mod level;
 mod prefetch;
 
+pub use array::Scalar;
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
 pub use level::{Kernel, Level, dispatch, dispatch_large, dispatch_one};

@@ -29,9 +29,11 @@ pub(super) struct Group {
 }
 
 impl Groups {
-    /// Of `placements`, in a world of `first` geometries. Where Embree knows no `arrays`, each is a group of its own.
+    /// Of those of `placements` that are usable, in a world of `first` geometries. Where Embree knows no `arrays`, each is
+    /// a group of its own.
     pub(super) fn new(placements: &[Placement], first: u32, arrays: bool) -> Self {
         let mut order: Vec<u32> = (0..placements.len() as u32).collect();
+        order.retain(|&i| placements[i as usize].is_usable());
         let kind = |&i: &u32| (placements[i as usize].object, placements[i as usize].keys.len());
         // Stable: ascending in each group.
         order.sort_by_key(kind);

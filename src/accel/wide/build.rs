@@ -8,6 +8,7 @@ use super::collapse::{Costs, combine, leaf_cost};
 use super::node::{Child, WIDTH};
 use super::reference::{Bounds, Reference};
 use super::source::Source;
+use super::split::{self, SpatialSplits, Survey};
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use simd::{Kernel, Lanes, Level, dispatch};
@@ -113,19 +114,39 @@ pub struct BinaryTree {
     pub references: Vec<Reference>,
     /// References that may share a leaf: 8 triangles, 1 box.
     pub leaf_size: usize,
+    /// References beyond one for each triangle.
+    pub splits: usize,
 }
 
 impl BinaryTree {
     /// The tree over all triangles that can be hit.
-    pub fn build(triangles: &Source<'_>) -> Self {
+    pub fn build(triangles: &Source<'_>, splits: SpatialSplits) -> Self {
         let n = triangles.len();
         assert!(n < Child::MAX_TRIANGLES, "the bvh holds up to 2^28 triangles, not {n}");
         let mut references: Vec<_> =
             (0..n).into_par_iter().with_min_len(PARALLEL).map(|i| Reference::of_triangle(triangles, i)).collect();
-        if !references.par_chunks(CHUNK).all(|chunk| chunk.iter().all(Reference::is_something)) {
+        let level = Level::best_of_8();
+        let survey = Survey::of(&references, level);
+        if !survey.is_complete {
             references.retain(Reference::is_something);
         }
-        Self::over(references, WIDTH, Level::best_of_8())
+        let is_split = match splits {
+            SpatialSplits::Auto => split::pays(triangles, &references, &survey),
+            SpatialSplits::Never => false,
+            SpatialSplits::Always => true,
+        };
+        if is_split {
+            let whole = references.len();
+            references = split::split(triangles, references, &survey.bounds);
+            let splits = references.len() - whole;
+            return Self { splits, ..Self::over(references, WIDTH, level, None) };
+        }
+        Self::over(references, WIDTH, level, Some(survey.bounds))
+    }
+
+    /// The tree over these references to triangles.
+    pub fn of_references(references: Vec<Reference>) -> Self {
+        Self::over(references, WIDTH, Level::best_of_8(), None)
     }
 
     /// The tree over the boxes that are not empty, each in a leaf of its own.
@@ -133,16 +154,22 @@ impl BinaryTree {
         let n = boxes.len();
         assert!(n <= Child::MAX_BOXES, "the bvh holds up to 2^30 boxes, not {n}");
         let references = boxes.iter().enumerate().filter_map(|(i, b)| Reference::of_box((*b)?, i)).collect();
-        Self::over(references, 1, Level::best_of_8())
+        Self::over(references, 1, Level::best_of_8(), None)
     }
 
-    fn over(mut references: Vec<Reference>, leaf_size: usize, level: Level) -> Self {
+    /// `bounds` are those of the references, if they are known.
+    fn over(mut references: Vec<Reference>, leaf_size: usize, level: Level, bounds: Option<Bounds>) -> Self {
         if references.is_empty() {
-            return Self { root: None, references, leaf_size };
+            return Self { root: None, references, leaf_size, splits: 0 };
         }
         let builder = Builder { level, leaf_size };
-        let root = builder.subtree(&mut references, Range { first: 0, depth: 0, bounds: None });
-        Self { root: Some(root), references, leaf_size }
+        let root = builder.subtree(&mut references, Range { first: 0, depth: 0, bounds });
+        Self { root: Some(root), references, leaf_size, splits: 0 }
+    }
+
+    /// The SAH cost: node visits, or as much work, of a line through the bounds.
+    pub fn cost(&self) -> f32 {
+        self.root.as_ref().map_or(0.0, |root| root.root().node().costs[0] / root.root().node().half_area())
     }
 }
 
@@ -484,7 +511,7 @@ mod tests {
 
     #[test]
     fn plain_code_builds_the_same_tree() {
-        let build = |level| format!("{:?}", BinaryTree::over(boxes(10_000), WIDTH, level));
+        let build = |level| format!("{:?}", BinaryTree::over(boxes(10_000), WIDTH, level, None));
         assert_eq!(build(Level::Portable8), build(Level::best_of_8()));
     }
 
@@ -498,7 +525,7 @@ mod tests {
                 _ => {}
             }
         }
-        let tree = BinaryTree::over(references, WIDTH, Level::best_of_8());
+        let tree = BinaryTree::of_references(references);
         let mut primitives: Vec<_> = tree.references.iter().map(Reference::primitive).collect();
         primitives.sort_unstable();
         primitives.dedup();

@@ -4,7 +4,7 @@ use super::node::{Child, FILTERED, Leaves, WIDTH};
 use super::ray::SingleRay;
 use crate::accel::MISS;
 use crate::accel::geometry::{Candidate, HitFilter};
-use crate::accel::woop::exact_edges;
+use crate::accel::woop::{exact_edges_of, in_doubt};
 use simd::{Float, Lanes, Mask};
 
 /// The nearest hit so far.
@@ -75,14 +75,14 @@ pub fn cross<L: Lanes>(corners: [Corner<L>; 3], lanes: u32, end: L::F) -> (u32, 
     if bits == 0 {
         return (0, zero, zero, zero);
     }
-    let doubtful = (e0.eq(zero) | e1.eq(zero) | e2.eq(zero)).bits() & bits;
+    let mut det = (e0 + e1) + e2;
+    let around = [[ax, ay], [bx, by], [cx, cy]];
+    let doubtful = in_doubt::<L>(around, [e0, e1, e2], det).bits() & bits;
     if doubtful != 0 {
-        e0 = exact_edges::<L>(e0, cx, by, cy, bx);
-        e1 = exact_edges::<L>(e1, ax, cy, ay, cx);
-        e2 = exact_edges::<L>(e2, bx, ay, by, ax);
+        [e0, e1, e2] = exact_edges_of::<L>(around, [e0, e1, e2], doubtful);
         bits &= one_side::<L>(e0, e1, e2);
+        det = (e0 + e1) + e2;
     }
-    let det = (e0 + e1) + e2;
     let (w, u, v) = (e0 / det, e1 / det, e2 / det);
     let t = (w * at + u * bt) + v * ct;
     (bits & (t.gt(zero) & t.le(end)).bits(), t, u, v)

@@ -1,27 +1,68 @@
 //! Checks of a finished tree, for tests and debug builds.
 
 use super::Tree;
+use super::clip::Polygon;
 use super::node::{Child, FILTERED, WIDTH};
 use super::source::Source;
 use crate::accel::woop::can_be_hit;
 
 const EVERYWHERE: [[f32; 3]; 2] = [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]];
 
-/// What is wrong with the tree, if anything: every triangle that can be hit is in exactly one leaf, every box contains
-/// what lies below it, and the depth is the stated one.
+/// What is wrong with the tree, if anything: every triangle that can be hit is in exactly one leaf or, with spatial splits,
+/// in at least one, and covered by the boxes of those leaves; every box contains what lies below it, the depth and the
+/// number of splits are the stated ones.
 pub fn validate(tree: &Tree, triangles: &Source<'_>) -> Result<(), String> {
-    let mut seen = vec![0u32; triangles.len()];
-    let depth = visit(tree, &mut |leaf, bounds| visit_leaf(tree, triangles, &mut seen, leaf, bounds), 0, EVERYWHERE)?;
+    let mut boxes = vec![Vec::new(); triangles.len()];
+    let depth = visit(tree, &mut |leaf, bounds| visit_leaf(tree, &mut boxes, leaf, bounds), 0, EVERYWHERE)?;
     if depth != tree.depth {
         return Err(format!("depth is {depth}, not {}", tree.depth));
     }
-    for (i, seen) in seen.into_iter().enumerate() {
-        let wanted = u32::from(can_be_hit(triangles.corners(i)));
-        if seen != wanted {
-            return Err(format!("triangle {i} is in {seen} leaves, not {wanted}"));
+    let mut splits = 0;
+    for (i, boxes) in boxes.iter().enumerate() {
+        let corners = triangles.corners(i);
+        let (found, wanted) = (boxes.len(), usize::from(can_be_hit(corners)));
+        if found < wanted || found > wanted && (wanted == 0 || tree.splits == 0) {
+            return Err(format!("triangle {i} is in {found} leaves, not {wanted}"));
+        }
+        splits += found - wanted;
+        if !is_covered(&Polygon::new(corners), boxes) && wanted == 1 {
+            return Err(format!("triangle {i}, {corners:?}, is not inside {boxes:?}"));
         }
     }
+    if splits != tree.splits {
+        return Err(format!("{splits} splits, not {}", tree.splits));
+    }
     Ok(())
+}
+
+/// Whether the boxes together contain a polygon: what sticks out of the first is looked for in the others.
+fn is_covered(polygon: &Polygon, boxes: &[[[f32; 3]; 2]]) -> bool {
+    let Some((&[low, high], others)) = boxes.split_first() else { return false };
+    let mut inside = *polygon;
+    for axis in 0..3 {
+        for (at, outer) in [(f64::from(low[axis]), 0), (f64::from(high[axis]), 1)] {
+            let sides = inside.cut(axis, at);
+            let bounds = inside.bounds();
+            let (out, keeps) = match sides {
+                Some(sides) => (Some(sides[outer]), Some(sides[1 - outer])),
+                None if outer == 0 && bounds[1][axis] < at || outer == 1 && bounds[0][axis] > at => {
+                    (Some(inside), None)
+                }
+                None if outer == 0 && bounds[0][axis] < at || outer == 1 && bounds[1][axis] > at => {
+                    (Some(inside), None)
+                }
+                None => (None, Some(inside)),
+            };
+            if out.is_some_and(|out| !is_covered(&out, others)) {
+                return false;
+            }
+            match keeps {
+                Some(rest) => inside = rest,
+                None => return true,
+            }
+        }
+    }
+    true
 }
 
 /// Depth of the subtree at `node`, which must lie in `outer`; `leaf` checks what lies in each box that is no node.
@@ -50,23 +91,13 @@ fn visit(
     Ok(depth + 1)
 }
 
-fn visit_leaf(
-    tree: &Tree,
-    triangles: &Source<'_>,
-    seen: &mut [u32],
-    leaf: Child,
-    bounds: [[f32; 3]; 2],
-) -> Result<(), String> {
+fn visit_leaf(tree: &Tree, boxes: &mut [Vec<[[f32; 3]; 2]>], leaf: Child, bounds: [[f32; 3]; 2]) -> Result<(), String> {
     if !leaf.is_leaf() {
         return Err(format!("{leaf:?} is a box in a tree over triangles"));
     }
     for i in 0..leaf.count() {
         let primitive = (tree.leaves.word(leaf, i) & !FILTERED) as usize;
-        *seen.get_mut(primitive).ok_or(format!("{leaf:?} names triangle {primitive}"))? += 1;
-        let corners = triangles.corners(primitive).map(|corner| corner.to_array());
-        if let Some(corner) = corners.into_iter().find(|&corner| !contains(bounds, corner)) {
-            return Err(format!("{leaf:?}: {corner:?} of triangle {primitive} is not inside {bounds:?}"));
-        }
+        boxes.get_mut(primitive).ok_or(format!("{leaf:?} names triangle {primitive}"))?.push(bounds);
     }
     Ok(())
 }

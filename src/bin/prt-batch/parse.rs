@@ -138,7 +138,7 @@ pub fn default_light() -> Words<DefaultLight> {
 }
 
 pub fn brdf() -> Words<Brdf> {
-    Words::new(&[("appendix-b", Brdf::AppendixB)], &["full"])
+    Words::new(&[("full", Brdf::Full), ("appendix-b", Brdf::AppendixB)], &[])
 }
 
 pub fn integrator() -> Words<&'static str> {

@@ -64,6 +64,13 @@ impl<L: Lanes> Visible<L> {
         Self::with_cap(wo, ax, ay, L::F::zero())
     }
 
+    /// [`Visible::all`] in `lanes`, [`Visible::new`] in the others.
+    #[inline(always)]
+    pub fn all_in(lanes: L::M, wo: V3<L>, ax: L::F, ay: L::F) -> Self {
+        let bounded = Self::new(wo, ax, ay);
+        Self::with_cap(wo, ax, ay, L::F::zero().or_else(lanes, bounded.left_out))
+    }
+
     #[inline(always)]
     fn with_cap(wo: V3<L>, ax: L::F, ay: L::F, left_out: L::F) -> Self {
         let (x, y) = (wo.x * ax, wo.y * ay);

@@ -1,7 +1,7 @@
 //! BSDF-03, -04, -05 and -10: sample against value, reciprocity, energy, finiteness.
 
 use super::{Scatterer, direction};
-use crate::verify::rng::Rng;
+use crate::math::random::Rng;
 
 /// Directional albedo as sampling finds it.
 #[derive(Clone, Copy, Debug)]
@@ -16,7 +16,7 @@ pub struct Furnace {
 
 /// The albedo from `wo` by `side` x `side` stratified directions (their lobe numbers stratified and shuffled).
 pub fn furnace(scatterer: &dyn Scatterer, wo: [f32; 3], side: usize, seed: u64) -> Furnace {
-    let mut rng = Rng::new(seed, "furnace", 0);
+    let mut rng = Rng::of_stream(seed, "furnace", 0);
     let n = side * side;
     let mut lobes: Vec<usize> = (0..n).collect();
     for i in (1..n).rev() {
@@ -68,7 +68,7 @@ impl Difference {
 /// BSDF-03: how far the density of samples is from that of `eval`, and their weight from value over density. Samples of
 /// delta lobes have neither.
 pub fn agreement(scatterer: &dyn Scatterer, wo: [f32; 3], samples: usize, seed: u64) -> Difference {
-    let mut rng = Rng::new(seed, "agreement", 0);
+    let mut rng = Rng::of_stream(seed, "agreement", 0);
     let u: Vec<[f32; 3]> = (0..samples).map(|_| [rng.unit(), rng.unit(), rng.unit()]).collect();
     let sampled: Vec<_> = scatterer.sample(wo, &u).into_iter().flatten().filter(|s| s.pdf.is_finite()).collect();
     let directions: Vec<[f32; 3]> = sampled.iter().map(|s| s.wi).collect();
@@ -86,7 +86,7 @@ pub fn agreement(scatterer: &dyn Scatterer, wo: [f32; 3], samples: usize, seed: 
 /// BSDF-04: how far f(a, b) is from f(b, a) in the upper hemisphere, over `pairs` random pairs (uniform, cosines from
 /// 0.01).
 pub fn reciprocity(scatterer: &dyn Scatterer, pairs: usize, seed: u64) -> Difference {
-    let mut rng = Rng::new(seed, "reciprocity", 0);
+    let mut rng = Rng::of_stream(seed, "reciprocity", 0);
     let mut difference = Difference::default();
     for _ in 0..pairs {
         let [a, b] = [(); 2]
@@ -123,7 +123,7 @@ impl Faults {
 pub fn finiteness(scatterer: &dyn Scatterer, views: usize, samples_each: usize, seed: u64) -> Faults {
     const COSINES: [f32; 8] = [1.0, 0.999_999_9, 0.5, 1e-3, 1e-5, 1e-7, 0.0, -1e-3];
     const NUMBERS: [f32; 6] = [0.0, 5.960_464_5e-8, 0.5, 0.25, 0.75, 1.0 - 5.960_464_5e-8];
-    let mut rng = Rng::new(seed, "finiteness", 0);
+    let mut rng = Rng::of_stream(seed, "finiteness", 0);
     let mut faults = Faults::default();
     for _ in 0..views {
         let mut any_direction = |low: f32| {

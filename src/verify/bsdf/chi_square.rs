@@ -7,7 +7,7 @@
 use super::domain::Domain;
 use super::statistics::chi_square_tail;
 use super::{Scatterer, direction};
-use crate::verify::rng::Rng;
+use crate::math::random::Rng;
 
 /// How much is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +62,7 @@ impl ChiSquare {
 pub fn chi_square(scatterer: &dyn Scatterer, wo: [f32; 3], domain: Domain, settings: Settings) -> ChiSquare {
     let Settings { samples, cells, seed } = settings;
     let view = wo.map(f64::from);
-    let mut rng = Rng::new(seed, "chi_square", 0);
+    let mut rng = Rng::of_stream(seed, "chi_square", 0);
     let u: Vec<[f32; 3]> = (0..samples).map(|_| [rng.unit(), rng.unit(), rng.unit()]).collect();
     let directions: Vec<[f32; 3]> =
         scatterer.sample(wo, &u).into_iter().flatten().filter(|s| s.pdf.is_finite()).map(|s| s.wi).collect();

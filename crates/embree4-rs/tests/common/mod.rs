@@ -127,7 +127,19 @@ impl Batch {
 
     pub fn rays(&self) -> RaysSoA<'_> {
         let [ox, oy, oz, dx, dy, dz, t_max, time] = &self.columns;
-        RaysSoA { ox, oy, oz, dx, dy, dz, t_max, time: Some(time), id: Some(&self.id), mask: Some(&self.mask) }
+        RaysSoA {
+            ox,
+            oy,
+            oz,
+            dx,
+            dy,
+            dz,
+            t_max,
+            time: Some(time),
+            id: Some(&self.id),
+            mask: Some(&self.mask),
+            is_open: false,
+        }
     }
 
     pub fn intersect(&self, scene: &CommittedScene, coherent: bool) -> Hits {

@@ -108,9 +108,9 @@ pub struct FileArgs {
     pub max_bounces: Option<u32>,
     /// Microfacet model
     ///
-    /// appendix-b: the single-scattering formulas of glTF 2.0 appendix B with height-correlated G, for comparison with
-    /// other renderers. full: energy-compensated, conserving; it will be the default when it is built.
-    #[arg(long, value_name = "MODEL", default_value = "appendix-b", value_parser = parse::brdf())]
+    /// full: energy-compensated, conserving, exact Fresnel reflectances. appendix-b: the single-scattering formulas of
+    /// glTF 2.0 appendix B with height-correlated G, for comparison with other renderers.
+    #[arg(long, value_name = "MODEL", default_value = "full", value_parser = parse::brdf())]
     #[arg(help_heading = SAMPLING)]
     pub brdf: Brdf,
     /// Pixel filter: box or tent, :WIDTH = full support in pixels

@@ -17,7 +17,7 @@ pub fn scene(scene: &SceneRays) -> String {
     for build in &scene.build {
         let _ = writeln!(
             text,
-            "  {:7}{:7.3}{:8.2}{:>13}{:11.1}{:>12}{:9.3} ({} thread{})",
+            "  {:7}{:7.3}{:8.2}{:>13}{:11.1}{:>12}{:9.3} ({} thread{}){}",
             build.backend,
             build.seconds,
             build.mtri_per_s,
@@ -27,6 +27,10 @@ pub fn scene(scene: &SceneRays) -> String {
             build.wall_seconds,
             build.threads,
             if build.threads == 1 { "" } else { "s" },
+            match build.split_references {
+                0 => String::new(),
+                n => format!(", long triangles in {n} more parts"),
+            },
         );
     }
     text += "  rays        setup     threads  backend  Mray/s   wall  of embree's  quartiles    of linear's\n";

@@ -1,0 +1,397 @@
+//! How much of the light that arrives a rough surface gives back after one reflection, so that the rest can be given back
+//! too: directional albedos of GGX, looked up N lanes at a time.
+//!
+//! After Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks". [`quadrature`] integrates in f64,
+//! [`tables`] stores it (`cargo run --release --example energy_tables`), and here it is turned into cells of four corners,
+//! so that a lookup is one load a lane.
+
+pub mod quadrature;
+pub mod tables;
+
+use crate::math::V3;
+use crate::math::lanes::lerp;
+use simd::{Float, Lanes, Uint};
+use tables::{GLASS, GLASS_MOST, NODES, SIDE, STRETCHED, stored};
+
+/// Which formulas surfaces follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Brdf {
+    /// Energy-compensated and conserving, with exact Fresnel reflectances.
+    #[default]
+    Full,
+    /// The single-scattering formulas of glTF 2.0 appendix B with height-correlated masking.
+    AppendixB,
+}
+
+/// Cells of a two-dimensional table of `nx` x `ny` nodes: corners 00, 10 (x), 01 (y), 11.
+fn cells(nx: usize, ny: usize, value: impl Fn(usize, usize) -> f32) -> Vec<[f32; 4]> {
+    let corners = |j: usize, i: usize| [value(j, i), value(j, i + 1), value(j + 1, i), value(j + 1, i + 1)];
+    (0..(nx - 1) * (ny - 1)).map(|n| corners(n / (nx - 1), n % (nx - 1))).collect()
+}
+
+/// The cell that holds position `at` in [0, 1] of an axis of `n` nodes, and where in it.
+#[inline(always)]
+fn cell<L: Lanes>(at: L::F, n: usize) -> (L::U, L::F) {
+    let last = (n - 1) as f32;
+    let scaled = (at.max(L::F::zero()) * L::F::splat(last)).min(L::F::splat(last));
+    let low = scaled.floor().min(L::F::splat(last - 1.0));
+    (low.to_uint(), scaled - low)
+}
+
+/// A column of a table, interpolated at `at` in [0, 1]. Means are taken of the tables as they are interpolated, so that
+/// what is given back adds up.
+fn column(values: &dyn Fn(usize) -> f32, at: f64) -> f64 {
+    let x = at * (SIDE - 1) as f64;
+    let i = (x as usize).min(SIDE - 2);
+    let (a, b) = (f64::from(values(i)), f64::from(values(i + 1)));
+    a + (b - a) * (x - i as f64)
+}
+
+/// `white` at roughness node `j` and cosine `mu`.
+fn white_at(j: usize, mu: f64) -> f64 {
+    let alpha = tables::row_alpha(j);
+    column(&|i| stored().white[j * SIDE + i], (mu * (1.0 + alpha) / (mu + alpha)).sqrt())
+}
+
+/// The mean albedo `e` as it is interpolated: what is lost grows as the fourth power of the roughness.
+fn lost(e: f32) -> f32 {
+    (1.0 - e).max(0.0).powf(0.25)
+}
+
+/// The inverse of [`lost`].
+#[inline(always)]
+fn kept<L: Lanes>(lost: L::F) -> L::F {
+    let square = lost * lost;
+    L::F::one() - square * square
+}
+
+/// Bilinear.
+#[inline(always)]
+fn corners<L: Lanes>(table: &[[f32; 4]], index: L::U, fx: L::F, fy: L::F) -> L::F {
+    let [a, b, c, d] = index.records(table);
+    lerp(lerp(a, b, fx), lerp(c, d, fx), fy)
+}
+
+/// The tables as shading reads them, with those of each index of refraction that a scene's dielectrics have.
+#[derive(Clone, Debug)]
+pub struct Energy {
+    /// Which formulas are followed.
+    pub brdf: Brdf,
+    white: Vec<[f32; 4]>,
+    /// Per index of refraction, cells of [`Albedo::rise`] (by root cosine and roughness).
+    rise: Vec<[f32; 4]>,
+    /// Per index of refraction, by roughness: the mean of E as [`lost`], then that of E x rise, at both ends of the cell.
+    means: Vec<[f32; 4]>,
+    iors: Vec<f32>,
+    /// By eta; empty in scenes without rough glass.
+    glass: Vec<[f32; 4]>,
+    /// By anisotropy; empty in scenes without.
+    stretched: Vec<[f32; 4]>,
+    stretched_means: Vec<[f32; 4]>,
+    /// Per node, its shares; empty in scenes without films.
+    hats: Vec<[f32; 4]>,
+    /// Per roughness, the means of those.
+    mean_hats: Vec<[f32; 4]>,
+}
+
+/// Cosines at which a film's reflectance is taken.
+pub const FILM_NODES: usize = 8;
+const RECORDS: u32 = FILM_NODES as u32 / 4;
+
+/// Cosine of node `k`.
+pub fn film_cosine(k: usize) -> f32 {
+    let root = k as f32 / (FILM_NODES - 1) as f32;
+    root * root
+}
+
+const CELLS: usize = (SIDE - 1) * (SIDE - 1);
+
+/// What a roughness fixes: where in the tables a surface is.
+#[derive(Clone, Copy)]
+pub struct Row<L: Lanes> {
+    alpha: L::F,
+    row: L::U,
+    fy: L::F,
+    class: L::U,
+    /// Cosine-weighted mean of the albedo E.
+    pub mean: L::F,
+    /// Mean of E x rise over that of E: how far Fresnel's curve has risen on average.
+    pub mean_rise: L::F,
+}
+
+impl<L: Lanes> Row<L> {
+    /// Of a surface that nobody asks about.
+    #[inline(always)]
+    pub fn nowhere() -> Self {
+        let (zero, none) = (L::F::zero(), L::U::splat(0));
+        Self { alpha: zero, row: none, fy: zero, class: none, mean: L::F::one(), mean_rise: zero }
+    }
+}
+
+/// The albedo towards one direction.
+#[derive(Clone, Copy)]
+pub struct Albedo<L: Lanes> {
+    /// Of GGX reflecting everything.
+    pub white: L::F,
+    /// How far Fresnel's curve has risen from normal incidence (0) to 1, on average over what is reflected.
+    pub rise: L::F,
+}
+
+impl Default for Energy {
+    fn default() -> Self {
+        Self::new(Brdf::Full)
+    }
+}
+
+impl Energy {
+    /// Without indices of refraction yet.
+    pub fn new(brdf: Brdf) -> Self {
+        let white = cells(SIDE, SIDE, |j, i| stored().white[j * SIDE + i]);
+        let empty = Vec::new;
+        let (rise, means, glass, stretched, stretched_means) = (empty(), empty(), empty(), empty(), empty());
+        let (hats, mean_hats) = (empty(), empty());
+        Self { brdf, white, rise, means, iors: Vec::new(), glass, stretched, stretched_means, hats, mean_hats }
+    }
+
+    /// The number of the tables for dielectrics of index `ior` (>= 1, or 0 for infinite), made on first use.
+    pub fn class(&mut self, ior: f32) -> u32 {
+        if let Some(found) = self.iors.iter().position(|&i| i == ior) {
+            return found as u32;
+        }
+        let nodes: [f64; NODES] =
+            std::array::from_fn(|k| quadrature::rise(tables::node_cosine(k, NODES), f64::from(ior)));
+        let hats = &stored().hats;
+        let rise = |j: usize, i: usize| {
+            let row = &hats[(j * SIDE + i) * NODES..][..NODES];
+            row.iter().zip(nodes).map(|(&h, n)| f64::from(h) * n).sum::<f64>() as f32
+        };
+        self.rise.extend(cells(SIDE, SIDE, rise));
+        let mean = |j: usize| {
+            let e = quadrature::mean(512, |mu| white_at(j, mu));
+            [e as f32, quadrature::mean(512, |mu| white_at(j, mu) * column(&|i| rise(j, i), mu.sqrt())) as f32]
+        };
+        let means: Vec<[f32; 2]> = (0..SIDE).map(mean).collect();
+        self.means.extend(means.windows(2).map(|w| [lost(w[0][0]), lost(w[1][0]), w[0][1], w[1][1]]));
+        self.iors.push(ior);
+        (self.iors.len() - 1) as u32
+    }
+
+    /// Makes the tables of rough glass.
+    pub fn add_glass(&mut self) {
+        let [ns, ny, nx] = GLASS;
+        for k in 0..ns {
+            for w in 0..2 {
+                self.glass.extend(cells(nx, ny, |j, i| stored().glass[((k * ny + j) * nx + i) * 2 + w]));
+            }
+        }
+    }
+
+    /// Makes the tables of thin films.
+    pub fn add_film(&mut self) {
+        // From the stored nodes to fewer.
+        let fewer = |shares: &[f32]| {
+            let mut sums = [0.0; FILM_NODES];
+            for (k, &share) in shares.iter().enumerate() {
+                let (low, part) = tables::between_nodes(tables::node_cosine(k, NODES), FILM_NODES);
+                sums[low] += share * (1.0 - part as f32);
+                sums[low + 1] += share * part as f32;
+            }
+            sums
+        };
+        let hats: Vec<f32> = stored().hats.chunks_exact(NODES).flat_map(fewer).collect();
+        self.hats = hats.chunks_exact(4).map(|h| [h[0], h[1], h[2], h[3]]).collect();
+        for j in 0..SIDE {
+            let all = quadrature::mean(256, |mu| white_at(j, mu));
+            let share = |k: usize| {
+                let hat = |i: usize| hats[(j * SIDE + i) * FILM_NODES + k];
+                (quadrature::mean(256, |mu| white_at(j, mu) * column(&hat, mu.sqrt())) / all) as f32
+            };
+            let shares: Vec<f32> = (0..FILM_NODES).map(share).collect();
+            self.mean_hats.extend(shares.chunks_exact(4).map(|h| [h[0], h[1], h[2], h[3]]));
+        }
+    }
+
+    /// Shares of the albedo towards cosine `mu` that come from normals at the nodes' cosines.
+    #[inline(always)]
+    pub fn film_shares<L: Lanes>(&self, row: &Row<L>, mu: L::F) -> [L::F; FILM_NODES] {
+        let (i, fx) = cell::<L>(mu.sqrt(), SIDE);
+        let first = (row.row * L::U::splat(SIDE as u32) + i) * L::U::splat(RECORDS);
+        let mut shares = [L::F::zero(); FILM_NODES];
+        for q in 0..RECORDS {
+            let at = first + L::U::splat(q);
+            let next = L::U::splat(RECORDS);
+            let above = at + L::U::splat(RECORDS * SIDE as u32);
+            let (a, b) = (at.records(&self.hats), (at + next).records(&self.hats));
+            let (c, d) = (above.records(&self.hats), (above + next).records(&self.hats));
+            for k in 0..4 {
+                let (low, high) = (lerp(a[k], b[k], fx), lerp(c[k], d[k], fx));
+                shares[q as usize * 4 + k] = lerp(low, high, row.fy);
+            }
+        }
+        shares
+    }
+
+    /// The same, cosine-weighted over all directions.
+    #[inline(always)]
+    pub fn film_mean_shares<L: Lanes>(&self, row: &Row<L>) -> [L::F; FILM_NODES] {
+        let mut shares = [L::F::zero(); FILM_NODES];
+        for q in 0..RECORDS {
+            let at = row.row * L::U::splat(RECORDS) + L::U::splat(q);
+            let (a, b) = (at.records(&self.mean_hats), (at + L::U::splat(RECORDS)).records(&self.mean_hats));
+            for k in 0..4 {
+                shares[q as usize * 4 + k] = lerp(a[k], b[k], row.fy);
+            }
+        }
+        shares
+    }
+
+    /// Index of refraction of the tables `class`.
+    #[inline(always)]
+    pub fn ior<L: Lanes>(&self, class: L::U) -> L::F {
+        class.gather(&self.iors)
+    }
+
+    /// Where surfaces of perceptual roughness `sqrt(alpha)` and tables `class` are.
+    #[inline(always)]
+    pub fn row<L: Lanes>(&self, alpha: L::F, class: L::U) -> Row<L> {
+        let (row, fy) = cell::<L>(alpha.sqrt().sqrt(), SIDE);
+        let [e0, e1, r0, r1] = (class * L::U::splat(SIDE as u32 - 1) + row).records(&self.means);
+        let mean = kept::<L>(lerp(e0, e1, fy));
+        let mean_rise = lerp(r0, r1, fy) / mean;
+        Row { alpha, row, fy, class, mean, mean_rise }
+    }
+
+    /// `row` at another `alpha`, but for its means.
+    #[inline(always)]
+    pub fn row_at<L: Lanes>(&self, row: &Row<L>, alpha: L::F) -> Row<L> {
+        let (at, fy) = cell::<L>(alpha.sqrt().sqrt(), SIDE);
+        Row { alpha, row: at, fy, ..*row }
+    }
+
+    /// The albedo towards cosine `mu` > 0.
+    #[inline(always)]
+    pub fn albedo<L: Lanes>(&self, row: &Row<L>, mu: L::F) -> Albedo<L> {
+        let one = L::F::one();
+        let x = (mu * (one + row.alpha) / (mu + row.alpha)).sqrt();
+        let (i, fx) = cell::<L>(x, SIDE);
+        let first = row.row * L::U::splat(SIDE as u32 - 1);
+        let white = corners::<L>(&self.white, first + i, fx, row.fy);
+        let (i, fx) = cell::<L>(mu.sqrt(), SIDE);
+        let class = row.class * L::U::splat(CELLS as u32);
+        let rise = corners::<L>(&self.rise, class + first + i, fx, row.fy);
+        Albedo { white, rise }
+    }
+
+    /// What a rough boundary reflects and lets through of white light together, seen at cosine `mu` > 0 from the side
+    /// before it: with `specular` = 1 by Fresnel's reflectance at `eta` (index behind / before), with 0 by total
+    /// reflection only.
+    #[inline(always)]
+    pub fn glass<L: Lanes>(&self, eta: L::F, alpha: L::F, mu: L::F, specular: L::F) -> L::F {
+        let one = L::F::one();
+        let [ns, ny, nx] = GLASS;
+        let s = (eta - one) / (eta + one);
+        let root = (s.abs() * L::F::splat(1.0 / GLASS_MOST as f32)).sqrt().copysign(s);
+        let (k, fs) = cell::<L>((root + one) * L::F::splat(0.5), ns);
+        let (j, fy) = cell::<L>(alpha.sqrt(), ny);
+        let (i, fx) = cell::<L>((mu * (one + alpha) / (mu + alpha)).sqrt(), nx);
+        let size = ((nx - 1) * (ny - 1)) as u32;
+        let first = (k + k) * L::U::splat(size) + j * L::U::splat(nx as u32 - 1) + i;
+        let size = L::U::splat(size);
+        let (a, b) = (first, first + size);
+        let (c, d) = (b + size, b + size + size);
+        let fresnel = lerp(corners::<L>(&self.glass, a, fx, fy), corners::<L>(&self.glass, c, fx, fy), fs);
+        let none = lerp(corners::<L>(&self.glass, b, fx, fy), corners::<L>(&self.glass, d, fx, fy), fs);
+        lerp(none, fresnel, specular)
+    }
+
+    /// Makes the tables of anisotropic surfaces.
+    pub fn add_stretched(&mut self) {
+        let [nl, nk, nj, ni] = STRETCHED;
+        let stored = &stored().stretched;
+        for slice in stored.chunks(nj * ni) {
+            self.stretched.extend(cells(ni, nj, |j, i| slice[j * ni + i]));
+        }
+        let mean = |k: usize, l: usize| {
+            let alphas = tables::stretch(tables::alpha_at(tables::node(k, nk)), tables::node(l, nl));
+            let slice = &stored[(l * nk + k) * nj * ni..][..nj * ni];
+            let at_azimuth = |j: usize| {
+                let [x2, y2] = [1.0 - tables::node(j, nj), tables::node(j, nj)];
+                let alpha = (alphas[0] * alphas[0] * x2 + alphas[1] * alphas[1] * y2).sqrt();
+                quadrature::mean(256, |mu| {
+                    let x = (mu * (1.0 + alpha) / (mu + alpha)).sqrt() * (ni - 1) as f64;
+                    let i = (x as usize).min(ni - 2);
+                    let (a, b) = (f64::from(slice[j * ni + i]), f64::from(slice[j * ni + i + 1]));
+                    a + (b - a) * (x - i as f64)
+                })
+            };
+            let rows: Vec<f64> = (0..nj).map(at_azimuth).collect();
+            // Uniform in azimuth; the rows are linear in its squared sine.
+            let n = 64;
+            let azimuths = (0..n).map(|i| ((i as f64 + 0.5) / n as f64 * std::f64::consts::FRAC_PI_2).sin().powi(2));
+            let along = azimuths.map(|p| {
+                let at = p * (nj - 1) as f64;
+                let j = (at as usize).min(nj - 2);
+                rows[j] + (rows[j + 1] - rows[j]) * (at - j as f64)
+            });
+            lost((along.sum::<f64>() / n as f64) as f32)
+        };
+        self.stretched_means = cells(nl, nk, mean);
+    }
+
+    /// Where anisotropic surfaces of `alpha` across and `strength` are.
+    #[inline(always)]
+    pub fn stretched_row<L: Lanes>(&self, alpha: L::F, strength: L::F) -> Stretched<L> {
+        let [nl, nk, ..] = STRETCHED;
+        let (l, fl) = cell::<L>(strength, nl);
+        let (k, fk) = cell::<L>(alpha.sqrt(), nk);
+        let mean = kept::<L>(corners::<L>(&self.stretched_means, k * L::U::splat(nl as u32 - 1) + l, fl, fk));
+        let along = alpha + (L::F::one() - alpha) * strength * strength;
+        Stretched { alphas: [along, alpha], first: l * L::U::splat(nk as u32) + k, fl, fk, mean }
+    }
+
+    /// The albedo of anisotropic GGX reflecting everything, towards the unit vector `w`, w.z > 0.
+    #[inline(always)]
+    pub fn stretched<L: Lanes>(&self, row: &Stretched<L>, w: V3<L>) -> L::F {
+        let one = L::F::one();
+        let [_, nk, nj, ni] = STRETCHED;
+        let (x2, y2) = (w.x * w.x, w.y * w.y);
+        let p = y2 / (x2 + y2).max(L::F::splat(1e-20));
+        let alpha = row.toward(w);
+        let (i, fx) = cell::<L>((w.z * (one + alpha) / (w.z + alpha)).sqrt(), ni);
+        let (j, fy) = cell::<L>(p, nj);
+        let size = L::U::splat(((ni - 1) * (nj - 1)) as u32);
+        let within = j * L::U::splat(ni as u32 - 1) + i;
+        let at = row.first * size + within;
+        let [a, b] = [at, at + size];
+        let far = size * L::U::splat(nk as u32);
+        let [c, d] = [a + far, b + far];
+        let table = &self.stretched;
+        let low = lerp(corners::<L>(table, a, fx, fy), corners::<L>(table, b, fx, fy), row.fk);
+        let high = lerp(corners::<L>(table, c, fx, fy), corners::<L>(table, d, fx, fy), row.fk);
+        lerp(low, high, row.fl)
+    }
+}
+
+/// [`Row`] of anisotropic surfaces.
+#[derive(Clone, Copy)]
+pub struct Stretched<L: Lanes> {
+    /// Along and across.
+    alphas: [L::F; 2],
+    first: L::U,
+    fl: L::F,
+    fk: L::F,
+    /// Cosine-weighted mean of the albedo.
+    pub mean: L::F,
+}
+
+impl<L: Lanes> Stretched<L> {
+    /// Alpha in the azimuth of `w`.
+    #[inline(always)]
+    pub fn toward(&self, w: V3<L>) -> L::F {
+        let (x2, y2) = (w.x * w.x, w.y * w.y);
+        let [ax, ay] = self.alphas;
+        let all = (x2 + y2).max(L::F::splat(1e-20));
+        // Straight from above it does not matter.
+        ((ax * ax * x2 + ay * ay * y2) / all).sqrt().max(ax.min(ay))
+    }
+}
