@@ -9,12 +9,12 @@ use prt::material::lobes::disney::Disney;
 use prt::material::lobes::sheen::Sheen;
 use prt::material::surface::DisneyExtras;
 use prt::math::V3;
+use prt::math::random::Rng;
 use prt::verify::bsdf::checks::{agreement, finiteness, furnace, reciprocity};
 use prt::verify::bsdf::chi_square::{Settings, chi_square, views};
 use prt::verify::bsdf::domain::Domain;
 use prt::verify::bsdf::statistics::sidak;
 use prt::verify::bsdf::{Evaluated, Sampled, Scatterer, direction};
-use prt::math::random::Rng;
 use published_disney::{Parameters, brdf};
 use simd::{Float, Kernel, Lanes, Level, Mask, dispatch};
 
