@@ -24,10 +24,12 @@ ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 # Extensions that a file may require. The others of the assets are refused by name.
 READ = {
     "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular",
-    "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_node_visibility", "KHR_texture_transform",
+    "KHR_materials_anisotropy", "KHR_materials_clearcoat", "KHR_materials_diffuse_transmission", "KHR_materials_dispersion",
+    "KHR_materials_iridescence", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_sheen", "KHR_materials_transmission",
+    "KHR_materials_variants", "KHR_materials_volume", "KHR_materials_unlit", "KHR_mesh_quantization", "KHR_node_visibility", "KHR_texture_transform",
     "EXT_mesh_gpu_instancing", "EXT_texture_webp",
     # Without effect on a picture.
-    "KHR_xmp", "KHR_xmp_json_ld", "KHR_materials_variants", "KHR_animation_pointer", "KHR_interactivity",
+    "KHR_xmp", "KHR_xmp_json_ld", "KHR_animation_pointer", "KHR_interactivity",
     "KHR_node_hoverability", "KHR_node_selectability",
 }
 # Of the contact sheet: folder or file, and what its label says.

@@ -34,12 +34,11 @@ fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
         let bvh = WideBvh::with_level(triangles, level);
         bvh.validate(triangles).expect("a sound tree");
         all.push((level.name(), Box::new(bvh)));
-        let Split { front, rest } = Split::new(triangles);
-        if let Some(big) = front {
-            let bounds = rest.bounds();
-            let behind = Box::new(WideBvh::with_level(rest, level));
+        let Split { all: everything, front } = Split::new(triangles);
+        if let Some((big, rest)) = front {
+            let [rest, everything] = [rest, everything].map(|g| Box::new(WideBvh::with_level(g, level)));
             let name = ["front scalar", "front portable", "front avx2", "front avx512"][level as usize];
-            all.push((name, Box::new(Front::new(big, behind, bounds).with_level(level))));
+            all.push((name, Box::new(Front::new(big, Some(rest), everything).with_level(level))));
         }
     }
     let split = WideBvh::with_splits(triangles, Level::best(), SpatialSplits::Always);

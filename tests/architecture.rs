@@ -21,7 +21,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("accel", &["error", "math"]),
     ("film", &["math"]),
     ("load", &["camera", "color", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
-    ("integrator", &["accel", "camera", "light", "material", "math", "sampler", "shape", "texture"]),
+    ("integrator", &["accel", "camera", "id", "light", "material", "math", "sampler", "shape", "texture"]),
     ("compare", &["image"]),
     ("verify", &["accel", "error", "math"]),
     (

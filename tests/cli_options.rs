@@ -108,3 +108,32 @@ fn the_noise_of_a_reference_is_taken_as_stated() {
     assert_eq!(json["passed"], true);
     assert_eq!(json["pairs"][0]["block_test"]["seeds"], 2);
 }
+
+#[test]
+fn variant_shows_other_materials_and_is_part_of_what_makes_a_picture() {
+    let root = folder();
+    let mut json: serde_json::Value = serde_json::from_str(SCENE).unwrap();
+    let unlit = |color: [f32; 4]| {
+        serde_json::json!({"pbrMetallicRoughness": {"baseColorFactor": color},
+            "extensions": {"KHR_materials_unlit": {}}})
+    };
+    json["materials"] = serde_json::json!([unlit([1.0, 0.0, 0.0, 1.0]), unlit([0.0, 0.0, 1.0, 1.0])]);
+    json["extensions"]["KHR_materials_variants"] = serde_json::json!({"variants": [{"name": "night"}]});
+    let primitive = &mut json["meshes"][0]["primitives"][0];
+    primitive["material"] = 0.into();
+    primitive["extensions"]["KHR_materials_variants"] =
+        serde_json::json!({"mappings": [{"material": 1, "variants": [0]}]});
+    fs::write(root.path().join("a.gltf"), json.to_string()).unwrap();
+    let exr = |options: &[&str]| {
+        let output = prt_in(root.path(), &[&SMALL[..], &["-v", "--exr-compression", "none"], options].concat());
+        (fs::read(root.path().join("renders/a.exr")).unwrap(), stderr(&output))
+    };
+    let (own, _) = exr(&[]);
+    let (night, said) = exr(&["--variant", "night"]);
+    assert!(said.contains("settings changed: variant"), "{said}");
+    assert!(own != night);
+    let args = [&SMALL[..], &["--variant", "dusk"]].concat();
+    let output = Command::new(env!("CARGO_BIN_EXE_prt-batch")).current_dir(root.path()).args(args).output().unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).contains("there is no variant \"dusk\"") && stderr(&output).contains("Allowed: \"night\""));
+}

@@ -204,10 +204,10 @@ fn agree(what: &str, with: With, seed: u64) {
         for (i, (got, want)) in got.iter().zip(&want).enumerate() {
             assert_eq!(got, want, "{what}: {} ray {i}", level.name());
         }
-        let Split { front, rest } = Split::new(all.clone());
-        if let Some(big) = front {
-            let bounds = rest.bounds();
-            let front = Front::new(big, Box::new(WideBvh::with_level(rest, level)), bounds).with_level(level);
+        let Split { all, front } = Split::new(all.clone());
+        if let Some((big, rest)) = front {
+            let [rest, all] = [rest, all].map(|g| Box::new(WideBvh::with_level(g, level)));
+            let front = Front::new(big, Some(rest), all).with_level(level);
             let got = trace("front", &front, &rays, n);
             assert!(got == want, "{what}: front {}", level.name());
         }

@@ -162,12 +162,14 @@ impl Wanted<'_> {
         }
 
         // The asset root only decides which files may be read; those that were are listed with their contents.
-        let LoadOptions { asset_root: _, scene, obj_up, obj_scale, smooth_angle } = load;
+        let LoadOptions { asset_root: _, scene, variant, obj_up, obj_scale, smooth_angle } = load;
         set("scene", scene.clone().unwrap_or_else(|| "default".into()));
         if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             set("obj-up", name(obj_up));
             set("obj-scale", obj_scale.unwrap_or(1.0).to_string());
             set("smooth-angle", smooth_angle.map_or_else(|| "off".into(), |angle| angle.to_string()));
+        } else if let Some(variant) = variant {
+            set("variant", variant.clone());
         }
 
         let RenderSettings {

@@ -83,29 +83,25 @@ impl Contenders {
     /// # Errors
     /// Embree's own.
     pub fn build(backends: &[Backend], geometry: &Geometry) -> Result<Self, RenderError> {
-        let Split { front, rest } = Split::new(geometry.clone());
-        let bounds = rest.bounds();
+        let Split { all, front } = Split::new(geometry.clone());
         let mut built = Self { fast: Vec::new(), linear: None, front: 0 };
         for backend in backends {
-            let mut add = |geometry: &Geometry, setup: Setup| -> Result<(), RenderError> {
-                for (entry, accel) in entries(backend, geometry)? {
-                    let accel: Box<dyn Accel> = match &front {
-                        Some(big) if setup == Setup::Prepared => Box::new(Front::new(big.clone(), accel, bounds)),
-                        _ => accel,
-                    };
-                    built.front = built.front.max(accel.stats().front);
-                    built.fast.push(Contender { backend: backend.name(), entry, setup, accel });
-                }
-                Ok(())
-            };
             if let Backend::Linear = backend {
                 built.linear = Some(Linear::new(geometry.clone()));
                 continue;
             }
-            add(&rest, Setup::Prepared)?;
-            if front.is_some() {
-                add(geometry, Setup::Bare)?;
+            let mut add = |(entry, accel): Entry, setup: Setup| {
+                built.front = built.front.max(accel.stats().front);
+                built.fast.push(Contender { backend: backend.name(), entry, setup, accel });
+            };
+            let Some((big, rest)) = &front else {
+                entries(backend, &all)?.into_iter().for_each(|entry| add(entry, Setup::Prepared));
+                continue;
+            };
+            for ((entry, rest), (_, all)) in entries(backend, rest)?.into_iter().zip(entries(backend, &all)?) {
+                add((entry, Box::new(Front::new(big.clone(), Some(rest), all))), Setup::Prepared);
             }
+            entries(backend, &all)?.into_iter().for_each(|entry| add(entry, Setup::Bare));
         }
         Ok(built)
     }

@@ -2,15 +2,15 @@
 
 use super::interaction::{Interaction, interact};
 use super::miss::see_environment;
-use super::normals::shading_normal;
+use super::normals::{shading_normal, view};
 use super::pool::PathPool;
 use super::wave::Counters;
 use super::{PathTracer, SceneTables};
 use crate::accel::MISS;
-use crate::material::bsdf::{Bsdf, View};
+use crate::material::bsdf::Bsdf;
 use crate::material::surface::Surface;
+use crate::math::V3;
 use crate::math::bend::let_mirror_leave;
-use crate::math::{Frame, V3};
 use crate::sampler::{Key, coverage_key, dims};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
 
@@ -186,13 +186,15 @@ fn surface<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, active: L::M) ->
 fn closure<'t, L: Lanes>(tables: &'t SceneTables, si: &Interaction<L>, active: L::M) -> Bsdf<'t, L> {
     let surface = surface(tables, si, active);
     if !tables.has_shading_normals() {
-        return Bsdf::new(&surface, &View::new(Frame::around(si.ng), si.wo), tables.materials.energy());
+        let view = view(tables, si, &surface, si.ng, active);
+        return Bsdf::new(&surface, &view, tables.materials.energy());
     }
     let ns = shading_normal(tables, si, active);
     // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
     let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
     let low = low & active & surface.has_specular();
-    let bsdf = Bsdf::new(&surface, &View::new(Frame::around(bent.or_else(low, ns)), si.wo), tables.materials.energy());
+    let view = view(tables, si, &surface, bent.or_else(low, ns), active);
+    let bsdf = Bsdf::new(&surface, &view, tables.materials.energy());
     if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
 }
 

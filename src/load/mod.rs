@@ -21,6 +21,8 @@ pub struct LoadOptions {
     pub asset_root: Option<PathBuf>,
     /// Which scene of the file: an index or a name; `None` = the file's default.
     pub scene: Option<String>,
+    /// glTF: the name of one of the file's variants of materials (`KHR_materials_variants`); `None` = its own materials.
+    pub variant: Option<String>,
     /// OBJ: which axis points up.
     pub obj_up: obj::ObjUp,
     /// OBJ: metres per unit, above 0; `None` = 1.

@@ -5,6 +5,7 @@ pub mod bsdf;
 mod bump;
 pub mod energy;
 pub mod extensions;
+mod features;
 mod film;
 pub mod layered;
 pub mod lobes;
@@ -92,12 +93,23 @@ impl Material {
             (self.base_color.texture, Channels::RGB),
             (self.opacity.texture, Channels::A),
             (self.metallic.texture, Channels::B),
-            (self.roughness.texture, Channels::G),
+            (self.roughness.texture, if self.specular_glossiness { Channels::A } else { Channels::G }),
             (self.normal.texture, Channels::RGB),
             (self.bump.texture, Channels::R),
             (self.emission.texture, Channels::RGB),
             (self.specular.texture, Channels::A),
             (self.specular_color.texture, Channels::RGB),
+            (self.clearcoat.factor.texture, Channels::R),
+            (self.clearcoat.roughness.texture, Channels::G),
+            (self.clearcoat.normal.texture, Channels::RGB),
+            (self.sheen.color.texture, Channels::RGB),
+            (self.sheen.roughness.texture, Channels::A),
+            (self.anisotropy.strength.texture, Channels::RGB),
+            (self.iridescence.factor.texture, Channels::R),
+            (self.iridescence.thickness_maximum.texture, Channels::G),
+            (self.transmission.factor.texture, Channels::R),
+            (self.diffuse_transmission.factor.texture, Channels::A),
+            (self.diffuse_transmission.color.texture, Channels::RGB),
         ];
         slots.into_iter().filter_map(|(texture, channels)| texture.map(|t| (t, channels))).collect()
     }
@@ -114,6 +126,17 @@ impl Material {
             &mut self.emission.texture,
             &mut self.specular.texture,
             &mut self.specular_color.texture,
+            &mut self.clearcoat.factor.texture,
+            &mut self.clearcoat.roughness.texture,
+            &mut self.clearcoat.normal.texture,
+            &mut self.sheen.color.texture,
+            &mut self.sheen.roughness.texture,
+            &mut self.anisotropy.strength.texture,
+            &mut self.iridescence.factor.texture,
+            &mut self.iridescence.thickness_maximum.texture,
+            &mut self.transmission.factor.texture,
+            &mut self.diffuse_transmission.factor.texture,
+            &mut self.diffuse_transmission.color.texture,
         ];
         slots.into_iter().flatten()
     }

@@ -1,6 +1,7 @@
 //! What a scene asks of the renderer, by name: `features` of the JSON, of a render and of a plan alike.
 
 use super::Prepared;
+use crate::material::Material;
 use crate::scene::Scene;
 
 /// Named yes/no facts about `scene` as it was prepared, in a fixed order.
@@ -13,7 +14,7 @@ pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)>
         ("default_light", prepared.default_light.used),
         ("textures", !scene.textures.is_empty()),
         ("shading_normals", scene.meshes.iter().any(|m| m.normals.is_some())),
-        ("normal_maps", tables.triangles.has_tangents()),
+        ("normal_maps", scene.materials.iter().any(Material::has_normal_map)),
         ("alpha", tables.materials.has_alpha()),
         ("unlit", tables.materials.has_unlit()),
         ("vertex_colors", tables.triangles.has_colors()),

@@ -6,11 +6,10 @@
 use super::placing::Placing;
 use super::tracer::window;
 use super::{AccelChoice, DefaultLight, RenderSettings};
-use crate::accel::front::MOST;
+use crate::accel::front::{MOST, MOST_TWICE};
 use crate::accel::geometry::{Affine, Placement};
 use crate::film::BLOCKS;
 use crate::light::{studio, table::PreparedLight};
-use crate::material::AlphaMode;
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
 use crate::shape::placement::PlacementTable;
@@ -120,8 +119,7 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
 /// What the picture of `scene` takes, all parts but `loading` and `left_over`. Nothing large is allocated to find out.
 pub fn estimate(scene: &Scene, settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let mut of_picture = of_picture(settings, files);
-    let is_opaque = scene.materials.iter().all(|m| m.alpha_mode == AlphaMode::Opaque);
-    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST && is_opaque {
+    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST {
         of_picture.program -= EMBREE_LIBRARY;
     }
     let Machinery { held, building } = Machinery::of(scene, settings);
@@ -243,6 +241,9 @@ struct AccelBytes {
 }
 
 fn accel(vertices: u64, triangles: u64, placements: u64, choice: AccelChoice) -> AccelBytes {
+    // With a front there are two trees; whether there is one shows only when the scene is prepared.
+    let trees = if triangles + placements <= MOST_TWICE as u64 && choice != AccelChoice::Linear { 2 } else { 1 };
+    let (vertices, triangles, placements) = (trees * vertices, trees * triangles, trees * placements);
     let geometry = 12 * (vertices + triangles);
     match choice {
         // It keeps the placements as they were handed to it.

@@ -450,34 +450,33 @@ pub fn build_accel(
         AccelChoice::Bvh => "bvh",
         AccelChoice::Linear => "linear",
     };
-    let mut note = String::new();
     if settings.accel == AccelChoice::Linear {
         let accel: Box<dyn Accel> = Box::new(Linear::new(geometry));
-        let report = report(&*accel, requested, note);
+        let report = report(&*accel, requested, String::new());
         return Ok((accel, report));
     }
-    let Split { front, rest } = Split::new(geometry);
-    let bounds = rest.bounds();
-    let behind: Box<dyn Accel> = match settings.accel {
-        AccelChoice::Linear => unreachable!("returned above"),
-        AccelChoice::Bvh => Box::new(WideBvh::build(rest)),
-        AccelChoice::Embree => Box::new(EmbreeAccel::build(rest, &settings.embree_dirs)?),
-        AccelChoice::Auto if bounds.is_none() => {
-            // Opening libembree4 costs tens of milliseconds, for nothing.
-            note = String::from("every triangle is tested in packets, so no Embree is needed");
-            Box::new(WideBvh::build(rest))
+    let Split { all, front } = Split::new(geometry);
+    let (library, note) = match settings.accel {
+        AccelChoice::Linear | AccelChoice::Bvh => (None, String::new()),
+        AccelChoice::Embree => (Some(embree::find(&settings.embree_dirs)?), String::new()),
+        // Opening libembree4 costs tens of milliseconds, for nothing.
+        AccelChoice::Auto if front.as_ref().is_some_and(|(big, _)| big.is_all()) => {
+            (None, String::from("every triangle is tested in packets, so no Embree is needed"))
         }
         AccelChoice::Auto => match embree::find(&settings.embree_dirs) {
-            Ok(library) => Box::new(EmbreeAccel::build_with(rest, &library)?),
-            Err(why) => {
-                note = why.to_string();
-                Box::new(WideBvh::build(rest))
-            }
+            Ok(library) => (Some(library), String::new()),
+            Err(why) => (None, why.to_string()),
         },
     };
+    let build = |geometry: Geometry| -> Result<Box<dyn Accel>, RenderError> {
+        Ok(match &library {
+            Some(library) => Box::new(EmbreeAccel::build_with(geometry, library)?),
+            None => Box::new(WideBvh::build(geometry)),
+        })
+    };
     let accel = match front {
-        Some(big) => Box::new(Front::new(big, behind, bounds)),
-        None => behind,
+        Some(front) => Box::new(Front::build(all, front, build)?),
+        None => build(all)?,
     };
     let report = report(&*accel, requested, note);
     Ok((accel, report))

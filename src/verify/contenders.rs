@@ -115,10 +115,9 @@ pub fn contenders(
         let accel: Arc<dyn Accel> = build(geometry.clone())?.into();
         all.push(Contender { name: names[0], backend, accel: Arc::clone(&accel), is_coherent: false });
         all.push(Contender { name: names[1], backend, accel, is_coherent: true });
-        let Split { front, rest } = Split::new(geometry.clone());
-        if let Some(big) = front {
-            let bounds = rest.bounds();
-            let front = Front::new(big, build(rest)?, bounds);
+        let Split { all: everything, front } = Split::new(geometry.clone());
+        if let Some(front) = front {
+            let front = Front::build(everything, front, build)?;
             all.push(Contender { name: names[2], backend, accel: Arc::new(front), is_coherent: false });
         }
     }

@@ -19,10 +19,12 @@ mod avx512;
 mod buffer;
 mod lanes;
 mod level;
+mod pages;
 mod prefetch;
 
 pub use array::Scalar;
 pub use buffer::Buffer;
 pub use lanes::{Float, Lanes, Mask, Uint};
 pub use level::{Kernel, Level, dispatch, dispatch_large, dispatch_one};
+pub use pages::prefer_large_pages;
 pub use prefetch::prefetch;

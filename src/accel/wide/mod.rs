@@ -21,6 +21,7 @@ mod packet;
 mod queries;
 mod ray;
 mod reference;
+mod sort;
 mod source;
 mod special;
 mod split;

@@ -161,53 +161,64 @@ fn intersect_packet<L: Lanes>(
     let valid = L::M::from_bits(valid);
     let (nowhere, none) = (L::F::splat(-1.0), L::F::splat(f32::INFINITY));
     let mut end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
-    let mut len = 1;
-    stack[0].child = bvh.world.root;
-    L::F::zero().store(&mut stack[0].enter, 0);
-    while len > 0 {
-        len -= 1;
-        let entry = &stack[len % STACK];
-        let child = entry.child;
-        let lanes = L::F::load(&entry.enter, 0).le(end).bits();
-        if lanes == 0 {
-            continue;
-        }
+    let (mut child, mut lanes, mut len) = (bvh.world.root, valid.bits(), 0);
+    loop {
         worth.visit(lanes);
         if child.is_leaf() {
             intersect_leaf::<L>(bvh, child, packet, shape, keys, lanes, nearest);
             end = box_ends::<L>(nearest.t).or_else(valid, nowhere);
-            continue;
-        }
-        let node = &bvh.world.tree.nodes[child.node()];
-        // Sorted by where their first ray enters, farthest first, before the large entries are written.
-        let (mut entered, mut firsts, mut order) = ([none; WIDTH], [0.0; WIDTH], [0; WIDTH]);
-        let mut n = 0;
-        for i in 0..node.count() {
-            let i = i % WIDTH;
-            let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
-            if bits == 0 {
+        } else {
+            let node = &bvh.world.tree.nodes[child.node()];
+            // Sorted by where their first ray enters, farthest first, before the large entries are written.
+            let (mut entered, mut firsts, mut order) = ([none; WIDTH], [0.0; WIDTH], [0; WIDTH]);
+            let mut bits_of = [0; WIDTH];
+            let mut n = 0;
+            for i in 0..node.count() {
+                let i = i % WIDTH;
+                let (bits, enter) = packet.test_box(&node.planes, i, shape.down, end);
+                if bits == 0 {
+                    continue;
+                }
+                (entered[i], bits_of[i]) = (enter, bits);
+                let mut at = [0.0; MAX_LANES];
+                enter.store(&mut at, 0);
+                let first = at[bits.trailing_zeros() as usize % MAX_LANES];
+                firsts[i] = first;
+                let mut j = n % WIDTH;
+                n += 1;
+                while j > 0 && firsts[order[j - 1]] < first {
+                    order[j] = order[j - 1];
+                    j -= 1;
+                }
+                order[j] = i;
+            }
+            if n > 0 {
+                let last = (n - 1) % WIDTH;
+                for &i in &order[..last] {
+                    debug_assert!(len < STACK);
+                    let entry = &mut stack[len % STACK];
+                    entered[i].or_else(L::M::from_bits(bits_of[i]), none).store(&mut entry.enter, 0);
+                    entry.child = node.child(i);
+                    ask_for(bvh, entry.child);
+                    len += 1;
+                }
+                // The nearest comes next, without a way over the stack.
+                let nearest = order[last];
+                (child, lanes) = (node.child(nearest), bits_of[nearest]);
                 continue;
             }
-            entered[i] = enter.or_else(L::M::from_bits(bits), none);
-            let mut at = [0.0; MAX_LANES];
-            enter.store(&mut at, 0);
-            let first = at[bits.trailing_zeros() as usize % MAX_LANES];
-            firsts[i] = first;
-            let mut j = n % WIDTH;
-            n += 1;
-            while j > 0 && firsts[order[j - 1]] < first {
-                order[j] = order[j - 1];
-                j -= 1;
-            }
-            order[j] = i;
         }
-        for &i in &order[..n.min(WIDTH)] {
-            debug_assert!(len < STACK);
-            let entry = &mut stack[len % STACK];
-            entered[i].store(&mut entry.enter, 0);
-            entry.child = node.child(i);
-            ask_for(bvh, entry.child);
-            len += 1;
+        loop {
+            if len == 0 {
+                return;
+            }
+            len -= 1;
+            let entry = &stack[len % STACK];
+            lanes = L::F::load(&entry.enter, 0).le(end).bits();
+            if lanes != 0 {
+                child = entry.child;
+                break;
+            }
         }
     }
 }

@@ -5,6 +5,7 @@ use super::feed::Which;
 use super::leaf::Nearest;
 use super::node::WIDTH;
 use super::packet::{IntersectPackets, OccludedPackets};
+use super::sort::{IsMixed, Sort, Sorted};
 use super::traverse::{Query, trace};
 use crate::accel::{HitBatch, MISS, RayBatch};
 use simd::{Kernel, Lanes, dispatch};
@@ -26,10 +27,21 @@ pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     if bvh.has_specials() {
         run(bvh, rays, 0..n, &mut Any(occluded));
     } else {
-        let mut left = Vec::new();
-        dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, occluded: &mut *occluded, left: &mut left });
-        run(bvh, rays, &left[..], &mut Any(occluded));
+        let scene = &bvh.world.tree.bounds;
+        if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
+            return occluded_in_packets(bvh, rays, n, occluded);
+        }
+        let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n });
+        let mut found = vec![0; n];
+        occluded_in_packets(bvh, &rays, n, &mut found);
+        from.iter().zip(found).for_each(|(&i, o)| occluded[i as usize] = o);
     }
+}
+
+fn occluded_in_packets(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
+    let mut left = Vec::new();
+    dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, occluded: &mut *occluded, left: &mut left });
+    run(bvh, rays, &left[..], &mut Any(occluded));
 }
 
 fn run(bvh: &WideBvh, rays: &RayBatch, which: impl Which, query: &mut impl Query) {

@@ -133,6 +133,7 @@ pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
         load: LoadOptions {
             asset_root: args.asset_root.clone(),
             scene: args.scene.clone(),
+            variant: args.variant.clone(),
             obj_up: args.obj_up,
             obj_scale: args.obj_scale,
             smooth_angle: args.smooth_angle,

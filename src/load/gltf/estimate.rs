@@ -1,7 +1,8 @@
 //! What reading a file will take of memory, by its JSON and the headers of its pictures: no mesh and no pixel is read.
 
 use super::container;
-use super::outline::{Accessor, Material, Node, Outline, Primitive, Uri};
+use super::outline::{Accessor, Node, Outline, Primitive, Uri};
+use super::slots::{needs_tangents, reads};
 use super::uri::percent_decode;
 use crate::image::decode::{MAX_PIXELS, MAX_SIDE};
 use crate::image::header::{Header, header};
@@ -45,7 +46,8 @@ pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<Lo
     let json = text + 2 * (data + images) + data / 4 * 3;
     let folders = Folders::new(path, options.asset_root.as_deref()).ok()?;
     let bin = container.bin.map(|bin| (bin.start, bin.end - bin.start));
-    let mut survey = Survey { path, outline: &outline, folders, bin, reached: Reached::default() };
+    let variant = options.variant.as_deref().and_then(|name| outline.variant(name));
+    let mut survey = Survey { path, outline: &outline, folders, bin, variant, reached: Reached::default() };
     survey.nodes(options.scene.as_deref())?;
     let Reached { kept, passing, left_over, images, .. } = std::mem::take(&mut survey.reached);
     let found: Vec<Picture> = images.iter().filter_map(|(&image, &used)| survey.picture(image, used)).collect();
@@ -76,6 +78,8 @@ struct Survey<'o> {
     folders: Folders,
     /// First byte and length of the BIN chunk.
     bin: Option<(u64, u64)>,
+    /// The place of the variant of materials that is shown.
+    variant: Option<usize>,
     reached: Reached,
 }
 
@@ -135,17 +139,18 @@ impl Survey<'_> {
                 vertex += bytes;
             }
         }
-        if let Some(material) = primitive.material {
+        if let Some(material) = primitive.material_in(self.variant) {
             let material = self.outline.materials.get(material)?;
             let reads = reads(material);
             let sets: BTreeSet<u32> = reads.iter().map(|(read, _)| read.tex_coord).collect();
-            vertex += 8 * sets.len() as u64;
-            let is_normal_mapped = material.normal_texture.is_some() && material.extensions.unlit.is_none();
-            if is_normal_mapped && has("NORMAL") {
+            let needs_tangents = needs_tangents(material);
+            // Tangents may run along a set that no texture reads.
+            vertex += 8 * (sets.len() as u64 + u64::from(needs_tangents));
+            if needs_tangents && has("NORMAL") {
                 vertex += 16;
             }
             // Tangents that are made part the vertices that do not share them.
-            if is_normal_mapped && !has("TANGENT") {
+            if needs_tangents && !has("TANGENT") {
                 passing += triangles * MIKKTSPACE;
                 self.reached.left_over = self.reached.left_over.max(triangles * MIKKTSPACE_LEFT);
             }
@@ -215,25 +220,6 @@ impl Survey<'_> {
         let is_allowed = found.width.max(found.height) <= MAX_SIDE && pixels <= MAX_PIXELS;
         is_allowed.then_some(Picture { header: found, encoded: bytes.length, waits: !is_file, used })
     }
-}
-
-/// The textures that a material's picture depends on, as `material` reads them, and their channels.
-fn reads(material: &Material) -> Vec<(super::outline::Read, Channels)> {
-    let pbr = &material.pbr_metallic_roughness;
-    let is_opaque = material.alpha_mode.as_deref().is_none_or(|mode| mode == "OPAQUE");
-    let base = if is_opaque { Channels::RGB } else { Channels::RGB | Channels::A };
-    let lit = material.extensions.unlit.is_none();
-    let glows = material.emissive_factor.iter().any(|&f| f > 0.0);
-    let specular = &material.extensions.specular;
-    let slots = [
-        (pbr.base_color_texture, base, true),
-        (pbr.metallic_roughness_texture, Channels::G | Channels::B, lit),
-        (material.normal_texture, Channels::RGB, lit),
-        (material.emissive_texture, Channels::RGB, lit && glows),
-        (specular.specular_texture, Channels::A, lit),
-        (specular.specular_color_texture, Channels::RGB, lit),
-    ];
-    slots.into_iter().filter_map(|(read, channels, is_read)| Some((read.filter(|_| is_read)?, channels))).collect()
 }
 
 /// Bytes of an element without padding.

@@ -25,10 +25,12 @@ mod outline;
 mod primitive;
 mod semantic;
 mod skin;
+mod slots;
 mod texture;
 mod texture_info;
 mod topology;
 mod uri;
+mod variants;
 
 pub(super) use estimate::estimate;
 
@@ -59,6 +61,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
     let chosen = node::choose_scene(&doc, options.scene.as_deref(), &parents)?;
 
     let mut loader = Loader::new(&doc, &parents, chosen.index);
+    loader.variant = variants::choose(&doc, options.variant.as_deref())?;
     doc.warnings.iter().for_each(|w| loader.builder.warn(w));
     if let Some(warning) = &chosen.warning {
         loader.builder.warn(warning);
@@ -107,6 +110,8 @@ struct Loader<'d> {
     /// glTF material (`None` = the default one) -> ours.
     materials: BTreeMap<Option<usize>, material::Read>,
     textures: texture::Textures,
+    /// Which of the file's variants of materials is shown; `None` = its own materials.
+    variant: Option<usize>,
     cameras: BTreeSet<usize>,
     lights: BTreeSet<usize>,
     /// Warnings that are given once a file.
@@ -124,6 +129,7 @@ impl<'d> Loader<'d> {
             worlds: BTreeMap::new(),
             materials: BTreeMap::new(),
             textures: texture::Textures::default(),
+            variant: None,
             cameras: BTreeSet::new(),
             lights: BTreeSet::new(),
             said: BTreeSet::new(),

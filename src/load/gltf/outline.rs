@@ -19,6 +19,7 @@ pub(super) struct Outline {
     pub nodes: Vec<Node>,
     pub scenes: Option<Vec<Scene>>,
     pub scene: Option<usize>,
+    pub extensions: RootExtensions,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -87,6 +88,7 @@ pub(super) struct Material {
     pub emissive_factor: [f32; 3],
     pub alpha_mode: Option<String>,
     pub extensions: MaterialExtensions,
+    pub extras: serde_json::Value,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -103,6 +105,9 @@ pub(super) struct MaterialExtensions {
     pub unlit: Option<serde::de::IgnoredAny>,
     #[serde(rename = "KHR_materials_specular")]
     pub specular: Specular,
+    /// As they are; see `slots`.
+    #[serde(flatten)]
+    pub others: BTreeMap<String, serde_json::Value>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -134,6 +139,53 @@ pub(super) struct Primitive {
     pub material: Option<usize>,
     pub mode: Option<u32>,
     pub targets: Vec<BTreeMap<String, usize>>,
+    pub extensions: PrimitiveExtensions,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct PrimitiveExtensions {
+    #[serde(rename = "KHR_materials_variants")]
+    variants: Mappings,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Mappings {
+    mappings: Vec<Mapping>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Mapping {
+    material: usize,
+    variants: Vec<usize>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct RootExtensions {
+    #[serde(rename = "KHR_materials_variants")]
+    variants: Variants,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct Variants {
+    variants: Vec<Variant>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Variant {
+    name: String,
+}
+
+impl Primitive {
+    /// Its material in a variant.
+    pub fn material_in(&self, variant: Option<usize>) -> Option<usize> {
+        let mappings = &self.extensions.variants.mappings;
+        let mapped = variant.and_then(|v| mappings.iter().find(|mapping| mapping.variants.contains(&v)));
+        mapped.map(|mapping| mapping.material).or(self.material)
+    }
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -205,6 +257,11 @@ impl<'de> Deserialize<'de> for Uri {
 }
 
 impl Outline {
+    /// The place of the variant of materials called `name`.
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.extensions.variants.variants.iter().position(|variant| variant.name == name)
+    }
+
     /// The root nodes of the scene that the user, else the file, asks for; `None` if there is no such scene.
     pub fn roots(&self, wanted: Option<&str>) -> Option<Vec<usize>> {
         let Some(scenes) = self.scenes.as_ref().filter(|scenes| !scenes.is_empty()) else {

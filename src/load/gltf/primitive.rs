@@ -1,10 +1,11 @@
 //! One primitive: its attributes, deformed by morph targets and skin, as a [`Mesh`].
 
 use super::accessor::{self, Elements};
+use super::material::Along;
 use super::semantic::{INDICES, NORMAL, POSITION, TANGENT, Wanted};
 use super::skin::Palette;
 use super::topology::{Topology, topology};
-use super::{Loader, Result, extensions, material, morph};
+use super::{Loader, Result, extensions, material, morph, variants};
 use crate::load::tangents;
 use crate::shape::Mesh;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -36,12 +37,12 @@ pub(super) fn read(
     let n = positions.count;
     let Some(indices) = triangles(loader, primitive, at, name, n)? else { return Ok(None) };
 
-    let surface = material::read(loader, primitive.material, &format!("{at}/material"))?;
-    let normal_map = loader.builder.material(surface.id).normal.texture.filter(|_| surface.normal_mapped);
+    let (material, material_at) = variants::material(loader, primitive, at)?;
+    let surface = material::read(loader, material, &material_at)?;
     let attributes = Attributes { loader, primitive, at };
     let normals = attributes.open(&Semantic::Normals, &NORMAL, Some(n))?;
     // Without normals, tangents are to be ignored (section 3.7.2.1).
-    let tangents = match normal_map.is_some() && normals.is_some() {
+    let tangents = match surface.tangents.is_some() && normals.is_some() {
         false => None,
         true => attributes.open(&Semantic::Tangents, &TANGENT, Some(n))?,
     };
@@ -54,6 +55,14 @@ pub(super) fn read(
             missing.push(set);
         }
         uv_sets.push(found);
+    }
+    // What no texture reads need not be there.
+    let mut along = surface.tangents;
+    if let Some(Along { set, is_optional: true, .. }) = along
+        && uv_sets.get(set).is_some_and(Option::is_none)
+    {
+        missing.retain(|&name| Some(&name) != surface.tex_coords.get(set));
+        along = along.filter(|_| tangents.is_some());
     }
     // Independent of each other, and most of the time that a large file takes.
     let ((positions, normals), (uv_sets, (tangents, colors))) = rayon::join(
@@ -86,14 +95,14 @@ pub(super) fn read(
     if primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(1))) {
         loader.lose_once("vertex colours other than COLOR_0 are ignored");
     }
-    if let Some(map) = normal_map {
-        add_tangents(loader, &mut mesh, at, &map);
+    if let Some(along) = along {
+        add_tangents(loader, &mut mesh, at, along);
     }
     Ok(Some(mesh))
 }
 
-/// Gives a normal-mapped mesh tangents, or repairs those it has.
-fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, map: &crate::texture::TextureRef) {
+/// Gives a mesh whose material asks for them tangents, or repairs those it has.
+fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, along: Along) {
     let name = mesh.name.clone();
     if mesh.tangents.is_some() {
         let repaired = tangents::repair(mesh);
@@ -101,7 +110,7 @@ fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, map: &crate::tex
             let text = format!("{name}: {at}: {repaired} tangents have no direction across the normal: replaced");
             loader.builder.warn(text);
         }
-    } else if let Err(tangents::TooManyTriangles(n)) = tangents::generate(mesh, map.uv_set as usize, map.transform) {
+    } else if let Err(tangents::TooManyTriangles(n)) = tangents::generate(mesh, along.set, along.transform) {
         let text =
             format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
         loader.builder.warn(text);

@@ -30,6 +30,24 @@ impl<'a> From<&'a NormalTexture> for Info<'a> {
     }
 }
 
+impl<'a> Info<'a> {
+    /// The reference that `value` is, which lies at `at`: of an extension that the `gltf` crate leaves as JSON.
+    pub fn from_json(doc: &Document, value: &'a Value, at: &str) -> Result<Self> {
+        let natural = |key: &str| value.get(key).map(|v| v.as_u64().and_then(|v| u32::try_from(v).ok()));
+        let bad = |key: &str, fix: &str| Err(doc.bad(&format!("{at}/{key}"), "is not allowed", fix));
+        let index = match natural("index") {
+            Some(Some(index)) => Index::new(index),
+            _ => return bad("index", "A reference to a texture has its index: 0, 1, 2, ..."),
+        };
+        let tex_coord = match natural("texCoord") {
+            None => 0,
+            Some(Some(set)) => set,
+            Some(None) => return bad("texCoord", "It is the number of a set of texture coordinates: 0, 1, 2, ..."),
+        };
+        Ok(Self { index, tex_coord, others: value.get("extensions").and_then(Value::as_object) })
+    }
+}
+
 /// The reference at `at`, with the file's `texCoord` as its set; `None` if the texture has no image that is read.
 pub(super) fn read(loader: &mut Loader, info: Info, at: &str) -> Result<Option<TextureRef>> {
     if let Some(others) = info.others {

@@ -245,12 +245,6 @@ impl Energy {
         shares
     }
 
-    /// Index of refraction of the tables `class`.
-    #[inline(always)]
-    pub fn ior<L: Lanes>(&self, class: L::U) -> L::F {
-        class.gather(&self.iors)
-    }
-
     /// Where surfaces of perceptual roughness `sqrt(alpha)` and tables `class` are.
     #[inline(always)]
     pub fn row<L: Lanes>(&self, alpha: L::F, class: L::U) -> Row<L> {

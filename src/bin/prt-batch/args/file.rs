@@ -56,6 +56,11 @@ pub struct FileArgs {
     /// Which scene: an index or a name [default: the file's]
     #[arg(long, value_name = "SCENE", help_heading = CAMERAS)]
     pub scene: Option<String>,
+    /// Which of a glTF file's variants of materials [default: the file's own materials]
+    ///
+    /// By its name in KHR_materials_variants; a file that does not have it is an error that lists those it has.
+    #[arg(long, value_name = "NAME", help_heading = CAMERAS)]
+    pub variant: Option<String>,
     /// Which cameras: all, an index or a name
     ///
     /// Of the default scene, or of that of --scene. A number is a place in the scene (depth first), anything else a

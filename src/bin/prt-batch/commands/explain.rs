@@ -92,7 +92,9 @@ fn text(plan: &Explanation) -> String {
         let words: Vec<&str> = words.into_iter().flatten().map(String::as_str).collect();
         let note = plan.accel_note.lines().last().map_or_else(String::new, |note| format!(" ({note})"));
         let front = plan.front_triangles.filter(|&n| n > 0);
-        let front = front.map_or_else(String::new, |n| format!("; {n} big triangles are tested in packets before"));
+        let front = front.map_or_else(String::new, |n| {
+            format!("; {n} big triangles are tested in packets before, for scattered rays")
+        });
         let splits = plan.split_references.filter(|&n| n > 0);
         let splits = splits.map_or_else(String::new, |n| format!("; long triangles in {} more parts", grouped(n)));
         lines.add("rays by", format!("{}{note}{splits}{front}", words.join(" ")));

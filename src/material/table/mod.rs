@@ -1,14 +1,17 @@
-//! Materials as shading reads them, and their textures applied.
+//! Materials as shading reads them, and their textures applied. What only some of them have is in `extras.rs`.
+
+mod extras;
 
 use super::energy::{Brdf, Energy};
 use super::surface::Surface;
 use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
 use crate::texture::TextureRef;
-use crate::texture::lookup::{Encoding, NO_TEXTURE, TextureTable};
+use crate::texture::lookup::{Encoding, NO_TEXTURE, Texel, TextureTable};
+use extras::ExtrasTable;
 use simd::{Float, Lanes, Mask, Uint};
 
-const RECORDS: u32 = 7;
+const RECORDS: u32 = 8;
 const DOUBLE_SIDED: u32 = 1;
 const EMISSIVE: u32 = 2;
 const MASK: u32 = 4;
@@ -16,11 +19,12 @@ const BLEND: u32 = 8;
 const UNLIT: u32 = 16;
 /// The metallic texture is the roughness texture, as always in glTF.
 const METALLIC_WITH_ROUGHNESS: u32 = 32;
+/// Specular and glossiness in place of metal and roughness.
+const GLOSSY: u32 = 64;
+/// The flags from here on are those of [`extras`].
+const EXTRAS_SHIFT: u32 = 8;
 
-/// The number of the index of refraction's tables stands above the flags.
-const CLASS_SHIFT: u32 = 16;
-
-/// Seven 16-byte records a material.
+/// Eight 16-byte records a material.
 ///
 /// | record | x | y | z | w |
 /// |---|---|---|---|---|
@@ -31,6 +35,7 @@ const CLASS_SHIFT: u32 = 16;
 /// | 4 | base texture | roughness | normal | specular |
 /// | 5 | specular colour texture | metallic, if it is not roughness' | opacity | bump |
 /// | 6 | alpha cutoff | bump height | bump without transform | - |
+/// | 7 | place in the table of extras | index of refraction | number of its albedo tables | - |
 ///
 /// Textures are bindings of the scene's [`TextureTable`].
 #[derive(Clone, Debug, Default)]
@@ -47,6 +52,10 @@ pub struct MaterialTable {
     has_unlit: bool,
     /// Some material has a height map.
     has_bump: bool,
+    /// Some material has specular and glossiness.
+    has_glossy: bool,
+    /// What only some materials have.
+    extras: ExtrasTable,
 }
 
 impl MaterialTable {
@@ -59,11 +68,19 @@ impl MaterialTable {
         if materials.is_empty() {
             table.push(&Material::default(), textures);
         }
+        if table.has_volume() {
+            table.energy.add_glass();
+        }
+        if table.has_anisotropy() {
+            table.energy.add_stretched();
+        }
+        if table.has_iridescence() {
+            table.energy.add_film();
+        }
         table
     }
 
     fn push(&mut self, m: &Material, textures: &mut TextureTable) {
-        let mut id = |t| f32::from_bits(textures.bind(t));
         let emits = !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0);
         let (alpha, cutoff) = match m.alpha_mode {
             AlphaMode::Opaque => (0, 0.0),
@@ -74,7 +91,11 @@ impl MaterialTable {
         let flags =
             [(m.double_sided, DOUBLE_SIDED), (emits, EMISSIVE), (m.unlit, UNLIT), (shares, METALLIC_WITH_ROUGHNESS)];
         let flags = flags.iter().filter(|f| f.0).fold(alpha, |bits, f| bits | f.1);
-        let flags = flags | self.energy.class(m.ior) << CLASS_SHIFT;
+        // An unlit surface shows its base colour as it is.
+        let is_glossy = m.specular_glossiness && !m.unlit;
+        let (place, extras) = self.extras.push(m, textures);
+        let flags = flags | if is_glossy { GLOSSY } else { 0 } | extras << EXTRAS_SHIFT;
+        let mut id = |t| f32::from_bits(textures.bind(t));
         let ([r, g, b], [er, eg, eb]) = (m.base_color.factor, m.emission.factor);
         // KHR_materials_ior: ior 0 stands for infinite, which reflects everything.
         let reflectance = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
@@ -90,6 +111,7 @@ impl MaterialTable {
             [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
             [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(bump)],
             [cutoff, m.bump.factor, id(plain_bump), 0.0],
+            [f32::from_bits(place), m.ior, f32::from_bits(self.energy.class(m.ior)), 0.0],
         ]);
         let textures = [
             m.base_color.texture,
@@ -103,6 +125,7 @@ impl MaterialTable {
         self.has_alpha |= alpha != 0;
         self.has_unlit |= m.unlit;
         self.has_bump |= bump.is_some();
+        self.has_glossy |= is_glossy;
     }
 
     /// The albedos that its surfaces are compensated by.
@@ -130,6 +153,11 @@ impl MaterialTable {
         self.has_unlit
     }
 
+    /// Whether anything has what only some materials have.
+    pub fn has_extras(&self) -> bool {
+        self.extras.has(extras::ANY)
+    }
+
     /// Whether anything has a height map.
     pub fn has_bump(&self) -> bool {
         self.has_bump
@@ -144,7 +172,8 @@ impl MaterialTable {
     /// The lanes whose material has a front only.
     #[inline(always)]
     pub fn single_sided<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
-        active & !self.record::<L>(material, 0)[3].to_bits().has(DOUBLE_SIDED)
+        // Both sides of a boundary count.
+        active & !self.record::<L>(material, 0)[3].to_bits().has(DOUBLE_SIDED | extras::VOLUME << EXTRAS_SHIFT)
     }
 
     /// Share of a surface that is there, in [0, 1]: 1 if opaque, 0 or 1 under a mask, else the opacity. `vertex` is the
@@ -207,7 +236,7 @@ impl MaterialTable {
         (factor * texel.rgb).or_else(textured, factor)
     }
 
-    /// Reflection parameters at texture coordinates `uvs`.
+    /// The parameters that every material has at texture coordinates `uvs`.
     #[inline(always)]
     pub fn surface<L: Lanes>(
         &self,
@@ -216,9 +245,8 @@ impl MaterialTable {
         uvs: &UvSets<L>,
         active: L::M,
     ) -> Surface<L> {
-        let [r, g, b, flags] = self.record::<L>(material, 0);
-        let class = flags.to_bits().shr(CLASS_SHIFT);
-        let ior = self.energy.ior::<L>(class);
+        let [r, g, b, _] = self.record::<L>(material, 0);
+        let [_, ior, class, _] = self.record::<L>(material, 7);
         let [metallic, roughness, specular, _] = self.record::<L>(material, 1);
         let [f0r, f0g, f0b, _] = self.record::<L>(material, 2);
         let mut s = Surface {
@@ -228,7 +256,7 @@ impl MaterialTable {
             specular,
             f0: V3::<L>::new(f0r, f0g, f0b),
             ior,
-            class,
+            class: class.to_bits(),
             extras: None,
         };
         if self.is_textured {
@@ -244,7 +272,11 @@ impl MaterialTable {
             let has = active & !rough.eq(none);
             if has.any() {
                 let t = textures.lookup::<L>(rough, uvs, Encoding::Linear);
-                s.roughness = (s.roughness * t.rgb.y).or_else(has, s.roughness);
+                s.roughness = if self.has_glossy {
+                    self.rough_or_glossy(material, s.roughness, &t).or_else(has, s.roughness)
+                } else {
+                    (s.roughness * t.rgb.y).or_else(has, s.roughness)
+                };
                 // Where the metallic texture is the same one, this was its lookup too; see `push`.
                 s.metallic = (s.metallic * t.rgb.z).or_else(has & shared, s.metallic);
             }
@@ -265,7 +297,39 @@ impl MaterialTable {
             }
         }
         s.f0 = s.f0.min(V3::splat([1.0; 3]));
+        if self.has_glossy {
+            // KHR_materials_pbrSpecularGlossiness: c_diff = diffuse x (1 - max(specular)).
+            let glossy = self.record::<L>(material, 0)[3].to_bits().has(GLOSSY);
+            s.base = s.base.scale(L::F::one() - s.f0.max_component()).or_else(glossy, s.base);
+        }
         s
+    }
+
+    /// [`MaterialTable::surface`] with what only some materials have.
+    #[inline(always)]
+    pub fn rich_surface<L: Lanes>(
+        &self,
+        textures: &TextureTable,
+        material: L::U,
+        uvs: &UvSets<L>,
+        active: L::M,
+    ) -> Surface<L> {
+        let extras = self.extras(textures, material, uvs, active);
+        Surface { extras, ..self.surface(textures, material, uvs, active) }
+    }
+
+    /// The lanes of `active` whose material has what only some have.
+    #[inline(always)]
+    pub fn rich<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
+        active & (self.record::<L>(material, 0)[3].to_bits().shr(EXTRAS_SHIFT)).has(extras::ANY)
+    }
+
+    /// `roughness` with the texel `t` applied, which holds roughness in G or glossiness in A.
+    #[inline(always)]
+    fn rough_or_glossy<L: Lanes>(&self, material: L::U, roughness: L::F, t: &Texel<L>) -> L::F {
+        let one = L::F::one();
+        let glossy = self.record::<L>(material, 0)[3].to_bits().has(GLOSSY);
+        (one - (one - roughness) * t.a).or_else(glossy, roughness * t.rgb.y)
     }
 
     /// The normal map's vector in tangent space (not normalised), and the lanes that have one.
@@ -277,16 +341,33 @@ impl MaterialTable {
         uvs: &UvSets<L>,
         active: L::M,
     ) -> (V3<L>, L::M) {
-        let texture = self.record::<L>(material, 4)[2].to_bits();
-        let has = active & !texture.eq(L::U::splat(NO_TEXTURE));
+        let texture = self.record::<L>(material, 4)[2];
         let flat = V3::splat([0.0, 0.0, 1.0]);
-        if !has.any() {
-            return (flat, has);
-        }
-        let scale = self.record::<L>(material, 1)[3];
-        let t = textures.lookup::<L>(texture, uvs, Encoding::Linear).rgb;
-        let (two, one) = (L::F::splat(2.0), L::F::one());
-        let n = V3::<L>::new((t.x * two - one) * scale, (t.y * two - one) * scale, t.z * two - one);
+        let Some((t, has)) = texel::<L>(textures, texture, uvs, active, Encoding::Linear) else {
+            return (flat, L::M::from_bits(0));
+        };
+        let n = tangent_normal(&t, self.record::<L>(material, 1)[3]);
         (n.or_else(has, flat), has)
     }
+}
+
+/// The texture in those of `lanes` that have one, and these; `None` where none has. `binding` is as in the records.
+#[inline(always)]
+fn texel<L: Lanes>(
+    textures: &TextureTable,
+    binding: L::F,
+    uvs: &UvSets<L>,
+    lanes: L::M,
+    encoding: Encoding,
+) -> Option<(Texel<L>, L::M)> {
+    let binding = binding.to_bits();
+    let has = lanes & !binding.eq(L::U::splat(NO_TEXTURE));
+    if has.any() { Some((textures.lookup::<L>(binding, uvs, encoding), has)) } else { None }
+}
+
+/// The vector of a normal map's texel, x and y times `scale`.
+#[inline(always)]
+fn tangent_normal<L: Lanes>(t: &Texel<L>, scale: L::F) -> V3<L> {
+    let (two, one) = (L::F::splat(2.0), L::F::one());
+    V3::new((t.rgb.x * two - one) * scale, (t.rgb.y * two - one) * scale, t.rgb.z * two - one)
 }
