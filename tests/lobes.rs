@@ -419,7 +419,7 @@ fn bsdf_12_smooth_coat_takes_exactly_its_reflectance_from_what_lies_below() {
 
 #[test]
 fn bsdf_12_rough_coat_reflects_its_albedo_with_multiple_scattering() {
-    // Without it there would be 8 % less at roughness 1; sampling leaves 0.3 %.
+    // Without it there would be 6 % less.
     let (lobe, wo) = (Lobe::Coat { factor: 1.0, roughness: 1.0 }, direction(0.7, 1.0));
     let stated = f64::from(ask(Level::best(), lobe, wo, &[wo])[0].albedo[0]);
     let found = furnace(&lobe, wo, 200, 8).albedo[0];
