@@ -102,7 +102,7 @@ impl Kernel for Probe<'_> {
         let half = L::F::splat(0.5);
         let mut uvs = UvSets::<L>::single(L::F::splat(0.25), half);
         uvs.set(1, L::F::splat(0.75), half);
-        let s = self.table.surface::<L>(self.textures, material, &uvs, all);
+        let s = self.table.rich_surface::<L>(self.textures, material, &uvs, all);
         let (coat_normal, has_coat_normal) = self.table.clearcoat_normal_map::<L>(self.textures, material, &uvs, all);
         let absorption = self.table.volume::<L>(material, all);
         let mut lanes = Vec::new();
@@ -128,7 +128,7 @@ impl Kernel for Probe<'_> {
                 values.sheen = [get(e.sheen.x), get(e.sheen.y), get(e.sheen.z), get(e.sheen_roughness)];
                 values.anisotropy = [get(e.anisotropy), get(e.anisotropy_direction[0]), get(e.anisotropy_direction[1])];
                 values.iridescence = [get(e.iridescence), get(e.iridescence_ior), get(e.iridescence_thickness)];
-                values.transmission = [get(e.transmission), get(e.ior), get(e.dispersion)];
+                values.transmission = [get(e.transmission), get(s.ior), get(e.dispersion)];
                 values.is_volume = is(e.is_volume);
                 let c = &e.diffuse_transmission_color;
                 values.diffuse_transmission = [get(e.diffuse_transmission), get(c.x), get(c.y), get(c.z)];
@@ -153,7 +153,7 @@ impl Kernel for Probe<'_> {
 
 fn tables(scene: &Scene) -> (MaterialTable, TextureTable) {
     let mut textures = TextureTable::new(&scene.textures, &scene.images).unwrap();
-    (MaterialTable::new(&scene.materials, &mut textures), textures)
+    (MaterialTable::new(&scene.materials, &mut textures, prt::render::Brdf::Full), textures)
 }
 
 /// What shading reads of the square's material; the same at every level.
