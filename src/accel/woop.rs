@@ -142,20 +142,27 @@ pub(super) fn in_doubt<L: Lanes>(corners: [[L::F; 2]; 3], edges: [L::F; 3], det:
 
 /// `edges` with those of the lanes `doubtful` (bits) re-evaluated. Rare, so one lane after the other.
 #[inline(always)]
-pub(super) fn exact_edges_of<L: Lanes>(corners: [[L::F; 2]; 3], edges: [L::F; 3], mut doubtful: u32) -> [L::F; 3] {
+pub(super) fn exact_edges_of<L: Lanes>(corners: [[L::F; 2]; 3], edges: [L::F; 3], doubtful: u32) -> [L::F; 3] {
     let (mut at, mut out) = ([[0.0; 16]; 6], [[0.0; 16]; 3]);
     for i in 0..3 {
         corners[i][0].store(&mut at[2 * i], 0);
         corners[i][1].store(&mut at[2 * i + 1], 0);
         edges[i].store(&mut out[i], 0);
     }
+    exact_edges_in(&at, &mut out, doubtful);
+    [L::F::load(&out[0], 0), L::F::load(&out[1], 0), L::F::load(&out[2], 0)]
+}
+
+/// The loop of [`exact_edges_of`], kept out of the kernels.
+#[cold]
+#[inline(never)]
+fn exact_edges_in(at: &[[f32; 16]; 6], out: &mut [[f32; 16]; 3], mut doubtful: u32) {
     while doubtful != 0 {
         let i = doubtful.trailing_zeros() as usize % 16;
         doubtful &= doubtful - 1;
         let [ax, ay, bx, by, cx, cy] = [at[0][i], at[1][i], at[2][i], at[3][i], at[4][i], at[5][i]];
         [out[0][i], out[1][i], out[2][i]] = exact_edges([[ax, ay], [bx, by], [cx, cy]]);
     }
-    [L::F::load(&out[0], 0), L::F::load(&out[1], 0), L::F::load(&out[2], 0)]
 }
 
 #[cfg(test)]

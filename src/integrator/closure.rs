@@ -6,6 +6,7 @@ use super::normals::{shading_normal, view};
 use crate::accel::HitBatch;
 use crate::material::bsdf::{Bsdf, View};
 use crate::material::layered::Layered;
+use crate::material::media::MediumTable;
 use crate::material::surface::Surface;
 use crate::math::bend::let_mirror_leave;
 use crate::math::{Frame, V3};
@@ -112,6 +113,26 @@ fn closure_of_one<'t>(
     }
     let view = View { eta, ..view(tables, &si, &surface, normal, active) };
     (Layered::new(&surface, &view, diffuse_normal, materials.energy()), transmits)
+}
+
+/// What hit `at` lets straight through to the viewer in direction `wo`, and where a ray goes on behind it; `None` where that
+/// is no thin glass.
+#[inline(never)]
+pub(super) fn pane(
+    tables: &SceneTables,
+    hits: &HitBatch,
+    at: usize,
+    wo: V3<Scalar>,
+) -> Option<(V3<Scalar>, V3<Scalar>)> {
+    let active = <Scalar as Lanes>::M::first(1);
+    let primitive = <Scalar as Lanes>::U::load(&hits.primitive, at);
+    let si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    let inside = MediumTable::inside::<Scalar>(si.triangle.material);
+    if !tables.media.is_thin_glass::<Scalar>(inside, active).any() {
+        return None;
+    }
+    let (closure, _) = closure_of_one(tables, hits, at, wo, 1.0);
+    Some((closure.straight(), si.behind()))
 }
 
 impl<L: Lanes> Closure<'_, L> {

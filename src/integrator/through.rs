@@ -4,16 +4,14 @@
 //! meets something else. Paths do the same on average (`BsdfSample::straight`), so both strategies of finding a light see
 //! the same one, and their densities are those of the last real scattering.
 
-use super::PathTracer;
-use super::closure::closure;
-use super::interaction::interact;
+use super::closure::pane;
+use super::{PathTracer, SceneTables};
 use super::pool::{PathPool, ROOM};
 use super::shade::{add_lanes, load3};
 use super::wave::Counters;
 use crate::accel::{HitBatch, MISS};
-use crate::material::media::MediumTable;
 use crate::math::V3;
-use simd::{Buffer, Float, Kernel, Lanes, Mask, Uint, dispatch_large};
+use simd::{Buffer, Float, Lanes, Mask, Scalar, Uint};
 
 /// What shadow rays through thin glass need beyond the others.
 pub struct Glass {
@@ -47,68 +45,46 @@ impl PathTracer<'_> {
             let Some(glass) = &mut pool.glass else { return };
             counters.shadow += pool.n_shadow as u64;
             self.accel.intersect(&pool.shadow, 0..pool.n_shadow, false, &mut glass.hits);
-            dispatch_large(self.level, Pass { tracer: self, pool });
+            pass(self.tables, pool);
         }
     }
 }
 
-/// One round: rays that got through are added, those at glass are packed to the front, the others are blocked.
-struct Pass<'a, 'b> {
-    tracer: &'a PathTracer<'b>,
-    pool: &'a mut PathPool,
-}
-
-impl Kernel for Pass<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { tracer, pool } = self;
-        let n = pool.n_shadow;
-        pool.n_shadow = 0;
-        for at in (0..n).step_by(L::N) {
-            pass::<L>(tracer, pool, at, L::M::first(n - at));
-        }
+/// One round: rays that got through are added, those at glass are packed to the front, the others are blocked. One ray at a
+/// time: few surfaces are smooth thin glass.
+fn pass(tables: &SceneTables, pool: &mut PathPool) {
+    let n = std::mem::take(&mut pool.n_shadow);
+    for at in 0..n {
+        pass_one(tables, pool, at);
     }
 }
 
-/// The rays `at ..` in the lanes of `active`.
-#[inline(always)]
-fn pass<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize, active: L::M) {
-    let tables = tracer.tables;
+/// Ray `at`.
+fn pass_one(tables: &SceneTables, pool: &mut PathPool, at: usize) {
+    let active = <Scalar as Lanes>::M::first(1);
     let Some(glass) = &pool.glass else { return };
-    let slot = L::U::load(&pool.shadow_slot, at);
+    let slot = <Scalar as Lanes>::U::load(&pool.shadow_slot, at);
     let [r, g, b] = &pool.shadow_radiance;
-    let radiance = load3::<L>(r, g, b, at);
-    let primitive = L::U::load(&glass.hits.primitive, at);
-    let missed = active & primitive.eq(L::U::splat(MISS));
-    let direction = load3::<L>(&pool.shadow.dx, &pool.shadow.dy, &pool.shadow.dz, at);
-    let t_max = L::F::load(&pool.shadow.t_max, at);
-    let key = L::U::load(&pool.shadow.key, at);
-    let hit = active & !missed;
-    let mut next = None;
-    if hit.any() {
-        let si = interact::<L>(tables, &glass.hits, at, -direction.normalized(), primitive, hit);
-        let thin = tables.media.is_thin_glass::<L>(MediumTable::inside::<L>(si.triangle.material), hit);
-        if thin.any() {
-            let tint: V3<L> = closure(tables, &glass.hits, at, &si, L::F::one(), thin).bsdf.straight();
-            let radiance = radiance * tint;
-            let passes = thin & radiance.max_component().gt(L::F::zero());
-            let origin = si.behind();
-            let end = load3::<L>(&glass.end[0], &glass.end[1], &glass.end[2], at);
-            let to_far = !t_max.is_finite();
-            next = Some((passes, origin, direction.or_else(to_far, end - origin), radiance, end));
-        }
+    let radiance = load3::<Scalar>(r, g, b, at);
+    if glass.hits.primitive[at] == MISS {
+        add_lanes::<Scalar>(pool, slot, radiance, active);
+        return;
     }
-    add_lanes::<L>(pool, slot, radiance, missed);
-    let Some((passes, origin, direction, radiance, end)) = next else { return };
+    let direction = load3::<Scalar>(&pool.shadow.dx, &pool.shadow.dy, &pool.shadow.dz, at);
+    let t_max = <Scalar as Lanes>::F::load(&pool.shadow.t_max, at);
+    let key = <Scalar as Lanes>::U::load(&pool.shadow.key, at);
+    let Some((tint, origin)) = pane(tables, &glass.hits, at, -direction.normalized()) else { return };
+    let radiance = radiance * tint;
+    let end = load3::<Scalar>(&glass.end[0], &glass.end[1], &glass.end[2], at);
+    let direction = direction.or_else(!t_max.is_finite(), end - origin);
+    let passes = active & radiance.max_component().gt(<Scalar as Lanes>::F::zero());
     let to = pool.n_shadow;
     if tables.materials.has_alpha() {
         key.compress(passes, &mut pool.shadow.key, to);
     }
-    pool.push_shadow::<L>(passes, (origin, direction, t_max), slot, radiance);
+    pool.push_shadow::<Scalar>(passes, (origin, direction, t_max), slot, radiance);
     if let Some(glass) = &mut pool.glass {
         // As it was, not as the sum of origin and direction rounds it.
-        glass.push(passes, end, to);
+        glass.push::<Scalar>(passes, end, to);
     }
 }
