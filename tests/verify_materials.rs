@@ -133,3 +133,28 @@ fn bsdf_13_black_surfaces_without_specular_reflection_give_nothing_and_no_number
     let faults = prt::verify::bsdf::checks::finiteness(&side, 50, 50, 1);
     assert_eq!(faults.count, 0, "{:?}", faults.first);
 }
+
+#[test]
+fn bsdf_05_stored_albedos_are_those_that_the_generator_makes() {
+    use prt::material::energy::tables::{GLASS, NODES, SIDE, STRETCHED, glass, hats, stored, stretched, white};
+    use prt::math::random::Rng;
+    let mut rng = Rng::new(5);
+    // As stored: steps of 1/65535.
+    let check = |name: &str, stored: f32, made: f64| {
+        assert!((f64::from(stored) - made).abs() < 1e-5, "{name}: stored {stored}, made {made}");
+    };
+    for _ in 0..6 {
+        let (j, i) = (rng.below(SIDE), rng.below(SIDE));
+        check("white", stored().white[j * SIDE + i], white(j, i, 256));
+        let made = hats(j, i, 128);
+        let row = &stored().hats[(j * SIDE + i) * NODES..][..NODES];
+        row.iter().zip(made).for_each(|(&stored, made)| check("hats", stored, made));
+        let [k, j, i] = GLASS.map(|n| rng.below(n));
+        let made = glass(k, j, i, 256);
+        let at = ((k * GLASS[1] + j) * GLASS[2] + i) * 2;
+        (0..2).for_each(|w| check("glass", stored().glass[at + w], made[w]));
+        let [l, k, j, i] = STRETCHED.map(|n| rng.below(n));
+        let at = ((l * STRETCHED[1] + k) * STRETCHED[2] + j) * STRETCHED[3] + i;
+        check("stretched", stored().stretched[at], stretched(l, k, j, i, 128));
+    }
+}
