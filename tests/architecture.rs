@@ -23,7 +23,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("load", &["camera", "color", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
     ("integrator", &["accel", "camera", "id", "light", "material", "math", "sampler", "shape", "texture"]),
     ("compare", &["image"]),
-    ("verify", &["accel", "error", "math"]),
+    ("verify", &["accel", "error", "material", "math", "texture"]),
     (
         "render",
         &[

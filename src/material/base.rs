@@ -168,9 +168,17 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let this = &mut base_closure;
         let mut share = zero;
         let mut sees_all = none;
+        let mut is_none = none;
         if RICH && let Some(extras) = extras {
+            share = extras.transmission;
+            sees_all = share.gt(zero);
+            // Where there is no boundary light goes on as it came, whatever the roughness: before any albedo is asked for.
+            is_none = extras.is_volume & sees_all & (view.eta - one).abs().lt(L::F::splat(NO_BOUNDARY));
+            let smooth = L::F::splat(DELTA_ALPHA).or_else(is_none, smooth);
+            let is_delta = is_delta | is_none;
+            (this.alpha, this.is_delta) = ([smooth, smooth], is_delta);
             let along = smooth + (one - smooth) * extras.anisotropy * extras.anisotropy;
-            this.is_stretched = extras.anisotropy.gt(zero) & !is_diffuse;
+            this.is_stretched = extras.anisotropy.gt(zero) & !is_diffuse & !is_none;
             if this.is_stretched.any() {
                 this.alpha = [along.or_else(this.is_stretched, smooth), smooth];
                 this.is_delta = is_delta & !this.is_stretched;
@@ -178,8 +186,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                     this.stretched = Some(energy.stretched_row::<L>(smooth, extras.anisotropy));
                 }
             }
-            share = extras.transmission;
-            sees_all = share.gt(zero);
             this.film = Film::new(extras, f0, base);
         }
         let [ax, ay] = this.alpha;
@@ -222,7 +228,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             if (share.gt(zero) | behind.gt(zero)).any() {
                 let is_volume = extras.is_volume & share.gt(zero);
                 let eta = view.eta;
-                let is_none = is_volume & (eta - one).abs().lt(L::F::splat(NO_BOUNDARY));
                 let mut gain = one;
                 if is_full {
                     let thin = one / white;
@@ -250,7 +255,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                     has_behind: behind.gt(zero),
                 });
                 this.diffuse = this.diffuse.scale(one - behind);
-                this.is_delta = this.is_delta | (is_none & share.gt(zero));
             }
         }
         // Shares of the albedo at this angle.

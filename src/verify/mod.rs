@@ -9,6 +9,7 @@ pub mod bsdf;
 pub mod catalogue;
 pub mod contenders;
 pub mod hits;
+pub mod materials;
 pub mod meshes;
 pub mod oracle;
 pub mod rays;

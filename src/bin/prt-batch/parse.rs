@@ -227,7 +227,7 @@ pub fn bench_rounds(value: &str) -> Result<usize, String> {
 }
 
 pub fn verify() -> Words<What> {
-    Words::new(&[("hits", What::Hits)], &["materials", "light", "lens", "shapes", "output"])
+    Words::new(&[("hits", What::Hits), ("materials", What::Materials)], &["light", "lens", "shapes", "output"])
 }
 
 pub fn backend() -> Words<Backend> {
@@ -237,6 +237,11 @@ pub fn backend() -> Words<Backend> {
 /// Rays of each kind at each mesh.
 pub fn rays(value: &str) -> Result<usize, String> {
     number(value, 1, 100_000_000)
+}
+
+/// Samples of each chi-square test; fewer fill no histogram.
+pub fn samples(value: &str) -> Result<usize, String> {
+    number(value, 1000, 100_000_000)
 }
 
 pub fn generate() -> Words<Product> {

@@ -3,7 +3,6 @@
 use crate::parse;
 use clap::{Args, ValueHint};
 use prt::verify::contenders::Backend;
-use prt::verify::hits::Settings;
 use std::path::PathBuf;
 
 /// What is verified.
@@ -11,27 +10,35 @@ use std::path::PathBuf;
 pub enum What {
     /// What rays hit.
     Hits,
+    /// What materials reflect.
+    Materials,
 }
 
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
     /// What is verified
     ///
-    /// hits: what rays hit, by every backend against f64.
+    /// hits: what rays hit, by every backend against f64. materials: energy, sampling and reciprocity of what they reflect.
     #[arg(value_name = "WHAT", default_value = "hits", value_parser = parse::verify())]
     pub what: What,
-    /// .gltf, .glb and .obj files, or folders of them [default: the built-in meshes]
+    /// .gltf, .glb and .obj files, or folders of them [default: the built-in meshes or materials]
     ///
-    /// Of each its default scene.
+    /// Of each its default scene; of that all materials.
     #[arg(value_name = "INPUT", value_hint = ValueHint::AnyPath)]
     pub inputs: Vec<PathBuf>,
-    /// Rays of each kind at each mesh or scene
-    #[arg(long, value_name = "N", default_value_t = Settings::RAYS, value_parser = parse::rays)]
-    pub rays: usize,
-    /// Other seeds, other rays
+    /// hits: rays of each kind at each mesh or scene [default: 5000]
+    #[arg(long, value_name = "N", value_parser = parse::rays)]
+    pub rays: Option<usize>,
+    /// materials: samples of each chi-square test [default: 100000]
+    #[arg(long, value_name = "N", value_parser = parse::samples)]
+    pub samples: Option<usize>,
+    /// materials: random ones besides the built-in grid [default: 0]
+    #[arg(long, value_name = "N", value_parser = parse::rays)]
+    pub random: Option<usize>,
+    /// Other seeds, other rays and samples
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed)]
     pub seed: u64,
-    /// Ray backends, separated by commas [default: all that are to be had]
+    /// hits: ray backends, separated by commas [default: all that are to be had]
     ///
     /// linear, brute force, takes part where there are at most 1000 triangles.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::backend())]
@@ -44,7 +51,7 @@ pub struct VerifyArgs {
     /// Its fields are below.
     #[arg(long)]
     pub json: bool,
-    /// A row for every kind of rays, and more rays to repeat faults with
+    /// A row for every kind of rays or every material, and more rays to repeat faults with
     #[arg(short, long)]
     pub verbose: bool,
 }

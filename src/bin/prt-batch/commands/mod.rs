@@ -8,3 +8,4 @@ mod exr_files;
 pub mod render;
 pub mod retone;
 pub mod verify;
+mod verify_materials;

@@ -20,7 +20,17 @@ use std::process::ExitCode;
 const TOLD: usize = 1;
 
 pub fn run(args: &VerifyArgs) -> ExitCode {
-    let What::Hits = args.what;
+    let refused = match args.what {
+        What::Hits => [("samples", args.samples.is_some()), ("random", args.random.is_some())],
+        What::Materials => [("rays", args.rays.is_some()), ("accel", !args.accel.is_empty())],
+    };
+    if let Some((name, _)) = refused.iter().find(|(_, is_given)| *is_given) {
+        let what = if args.what == What::Hits { "hits" } else { "materials" };
+        return term::usage(&format!("--{name} means nothing to verify {what}; leave it out"));
+    }
+    if args.what == What::Materials {
+        return super::verify_materials::run(args);
+    }
     let (backends, embree) = match backends(&args.accel) {
         Ok(backends) => backends,
         Err(message) => return failed(&message),
@@ -28,7 +38,8 @@ pub fn run(args: &VerifyArgs) -> ExitCode {
     if let Some(note) = embree {
         term::warning(&note);
     }
-    let settings = Settings { rays: args.rays, seed: args.seed, backends, embree_dirs: embree_dirs() };
+    let settings =
+        Settings { rays: args.rays.unwrap_or(Settings::RAYS), seed: args.seed, backends, embree_dirs: embree_dirs() };
     let pool = match pool(args.threads) {
         Ok(pool) => pool,
         Err(error) => return failed(&error.to_string()),
