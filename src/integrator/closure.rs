@@ -10,7 +10,7 @@ use crate::material::media::MediumTable;
 use crate::material::surface::Surface;
 use crate::math::bend::let_mirror_leave;
 use crate::math::{Frame, V3};
-use simd::{Float, Lanes, Mask, Scalar, Uint};
+use simd::{Float, Lanes, Mask, Part, Scalar, Uint};
 
 /// A surface at a hit, all but directions known.
 pub(super) struct Closure<'t, L: Lanes> {
@@ -45,18 +45,7 @@ pub(super) fn closure<'t, L: Lanes>(
     eta: L::F,
     active: L::M,
 ) -> Closure<'t, L> {
-    let surface = surface(tables, si, active);
-    let energy = tables.materials.energy();
-    let bsdf = if tables.has_shading_normals() {
-        let ns = shading_normal(tables, si, active);
-        // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
-        let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
-        let low = low & active & surface.has_specular();
-        let bsdf = Bsdf::new(&surface, &View::new(Frame::around(bent.or_else(low, ns)), si.wo), energy);
-        if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
-    } else {
-        Bsdf::new(&surface, &View::new(Frame::around(si.ng), si.wo), energy)
-    };
+    let bsdf = L::outline(Plain { tables, si, active });
     let none = L::M::from_bits(0);
     if !tables.materials.has_extras() {
         return Closure { bsdf, transmits: none };
@@ -81,6 +70,33 @@ pub(super) fn closure<'t, L: Lanes>(
         layered.push((lane, one));
     }
     Closure { bsdf: bsdf.with_layered(layered), transmits: L::M::from_bits(transmits) }
+}
+
+/// The closures of all lanes as if no material had more than metal and roughness.
+struct Plain<'a, 't, L: Lanes> {
+    tables: &'t SceneTables,
+    si: &'a Interaction<L>,
+    active: L::M,
+}
+
+impl<'t, L: Lanes> Part<L> for Plain<'_, 't, L> {
+    type Output = Bsdf<'t, L>;
+
+    #[inline(always)]
+    fn run(self) -> Bsdf<'t, L> {
+        let Self { tables, si, active } = self;
+        let surface = surface(tables, si, active);
+        let energy = tables.materials.energy();
+        if !tables.has_shading_normals() {
+            return Bsdf::new(&surface, &View::new(Frame::around(si.ng), si.wo), energy);
+        }
+        let ns = shading_normal(tables, si, active);
+        // Only what mirrors needs a mirror direction; the diffuse lobe keeps the normal as it is.
+        let (bent, low) = let_mirror_leave(ns, si.ng, si.wo);
+        let low = low & active & surface.has_specular();
+        let bsdf = Bsdf::new(&surface, &View::new(Frame::around(bent.or_else(low, ns)), si.wo), energy);
+        if low.any() { bsdf.with_diffuse_normal(ns, low) } else { bsdf }
+    }
 }
 
 /// The closure of hit `at` seen from `wo`, whose material has what only some have, and whether light may get through it.

@@ -5,10 +5,10 @@
 //! the same one, and their densities are those of the last real scattering.
 
 use super::closure::pane;
-use super::{PathTracer, SceneTables};
 use super::pool::{PathPool, ROOM};
 use super::shade::{add_lanes, load3};
 use super::wave::Counters;
+use super::{PathTracer, SceneTables};
 use crate::accel::{HitBatch, MISS};
 use crate::math::V3;
 use simd::{Buffer, Float, Lanes, Mask, Scalar, Uint};

@@ -9,7 +9,7 @@ use super::energy::Energy;
 use super::layered::Layered;
 use super::surface::Surface;
 use crate::math::{Frame, V3};
-use simd::{Float, Lanes, Mask, Scalar};
+use simd::{Float, Lanes, Mask, Part, Scalar};
 
 /// A surface's reflection and transmission at one hit; no textures left.
 pub struct Bsdf<'e, L: Lanes> {
@@ -96,7 +96,7 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
     /// Value and density for world direction `wi`; each lobe is zero beyond its horizon.
     #[inline(always)]
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {
-        let value = self.base.eval(self.frame.to_local(wi));
+        let value = L::outline(EvalBase { base: &self.base, wi: self.frame.to_local(wi) });
         if self.layered.is_empty() { value } else { self.eval_layered(wi, value) }
     }
 
@@ -165,7 +165,7 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
         let sample = self.base.sample(u, u_lobe);
         let wi = self.frame.to_world(sample.wi);
         let (diffuse, is_diffuse) = self.base.only_diffuse();
-        let value = self.base.eval(sample.wi);
+        let value = L::outline(EvalBase { base: &self.base, wi: sample.wi });
         if !self.base.has_specular() {
             return BsdfSample {
                 wi,
@@ -186,6 +186,21 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
             transmitted: sample.transmitted,
             straight: sample.straight,
         }
+    }
+}
+
+/// [`Base::eval`], which is called for the light's direction and for the sampled one.
+struct EvalBase<'a, 'e, L: Lanes> {
+    base: &'a Base<'e, L, false>,
+    wi: V3<L>,
+}
+
+impl<L: Lanes> Part<L> for EvalBase<'_, '_, L> {
+    type Output = BsdfValue<L>;
+
+    #[inline(always)]
+    fn run(self) -> BsdfValue<L> {
+        self.base.eval(self.wi)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Plain arrays as lanes: 1 lane is the readable reference, 8 lanes the portable path.
 
-use crate::lanes::{Float, Lanes, Mask, Uint};
+use crate::lanes::{Float, Lanes, Mask, Part, Uint};
 use std::array::from_fn;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
@@ -13,6 +13,11 @@ impl Lanes for Scalar {
     type F = F<1>;
     type U = U<1>;
     type M = M<1>;
+
+    #[inline(never)]
+    fn outline<P: Part<Self>>(part: P) -> P::Output {
+        part.run()
+    }
 }
 
 /// Eight lanes of plain code.
@@ -24,6 +29,11 @@ impl Lanes for Portable8 {
     type F = F<8>;
     type U = U<8>;
     type M = M<8>;
+
+    #[inline(never)]
+    fn outline<P: Part<Self>>(part: P) -> P::Output {
+        part.run()
+    }
 }
 
 /// Floats.

@@ -5,7 +5,7 @@
 //! private to the crate and reach kernels only as the parameter of `Kernel::run`). Memory is touched only through
 //! slices whose bounds the line above the access has checked; loads and stores are unaligned ones.
 
-use crate::lanes::{Float, Lanes, Mask, Uint};
+use crate::lanes::{Float, Lanes, Mask, Part, Uint};
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 
@@ -30,6 +30,18 @@ impl Lanes for Avx2 {
     type F = F;
     type U = U;
     type M = M;
+
+    #[inline(always)]
+    fn outline<P: Part<Self>>(part: P) -> P::Output {
+        // SAFETY: see the head of this file.
+        unsafe { outlined(part) }
+    }
+}
+
+#[inline(never)]
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,popcnt,lzcnt")]
+fn outlined<P: Part<Avx2>>(part: P) -> P::Output {
+    part.run()
 }
 
 impl Add for F {

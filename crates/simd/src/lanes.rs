@@ -12,6 +12,18 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     type U: Uint<F = Self::F, M = Self::M>;
     /// N booleans.
     type M: Mask;
+
+    /// Runs `part` as a function of its own, compiled for the same level: large kernels take the compiler less when cut
+    /// into parts, and a part that is called twice is there once.
+    fn outline<P: Part<Self>>(part: P) -> P::Output;
+}
+
+/// A part of a kernel, see [`Lanes::outline`].
+pub trait Part<L: Lanes> {
+    /// What it returns.
+    type Output;
+    /// The part; `#[inline(always)]`, as all it calls.
+    fn run(self) -> Self::Output;
 }
 
 /// N booleans.

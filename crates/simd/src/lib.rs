@@ -24,7 +24,7 @@ mod prefetch;
 
 pub use array::Scalar;
 pub use buffer::Buffer;
-pub use lanes::{Float, Lanes, Mask, Uint};
+pub use lanes::{Float, Lanes, Mask, Part, Uint};
 pub use level::{Kernel, Level, dispatch, dispatch_large, dispatch_one};
 pub use pages::prefer_large_pages;
 pub use prefetch::prefetch;
