@@ -28,7 +28,7 @@ fn cpu_ns() -> f64 {
     text.split(' ').next().and_then(|ns| ns.parse().ok()).expect("a number")
 }
 
-fn ball() -> Mesh {
+fn ball(material: MaterialId) -> Mesh {
     let (rows, columns) = (25_u32, 40_u32);
     let at = |row: u32, column: u32| {
         let (theta, phi) = (f64::from(row) / f64::from(rows), 2.0 * f64::from(column) / f64::from(columns));
@@ -42,23 +42,14 @@ fn ball() -> Mesh {
         [[a, c, b], [b, c, d]]
     };
     let indices = (0..rows).flat_map(|row| (0..columns).flat_map(move |column| quad(row, column))).collect();
-    Mesh {
-        positions,
-        normals: None,
-        uv_sets: Vec::new(),
-        colors: None,
-        tangents: None,
-        indices,
-        material: MaterialId(0),
-        name: String::from("ball"),
-    }
+    Mesh::plain("ball", positions, indices, material)
 }
 
 /// `n` balls in a cube of side 1 whose boxes are met by `entries` of the lines through it on average.
 fn scene(n: usize, entries: f64) -> Scene {
     let mut builder = SceneBuilder::new(0);
     let material = builder.add_material(prt::material::Material::default());
-    let mesh = builder.add_mesh(Mesh { material, ..ball() });
+    let mesh = builder.add_mesh(ball(material));
     let radius = 0.5 * (entries / n as f64).sqrt();
     for i in 0..n as u64 {
         let at = DVec3::new(random(7 * i), random(7 * i + 1), random(7 * i + 2));

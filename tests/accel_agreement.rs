@@ -2,6 +2,8 @@
 //!
 //! Test names carry the IDs of the stress-test catalogue. Seeds are fixed.
 
+#[path = "support/fronts.rs"]
+mod fronts;
 #[path = "support/meshes.rs"]
 mod meshes;
 #[path = "support/rng.rs"]
@@ -9,7 +11,6 @@ mod rng;
 
 use glam::{DVec3, Vec3};
 use meshes::{batch, grid, placed, random_soup, slivers, soup, sphere};
-use prt::accel::front::{Front, Split};
 use prt::accel::linear::Linear;
 use prt::accel::wide::{SpatialSplits, WideBvh};
 use prt::accel::{Accel, HitBatch, MISS, Triangles};
@@ -34,11 +35,9 @@ fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
         let bvh = WideBvh::with_level(triangles, level);
         bvh.validate(triangles).expect("a sound tree");
         all.push((level.name(), Box::new(bvh)));
-        let Split { all: everything, front } = Split::new(triangles);
-        if let Some((big, rest)) = front {
-            let [rest, everything] = [rest, everything].map(|g| Box::new(WideBvh::with_level(g, level)));
+        if let Some(front) = fronts::front(triangles, level) {
             let name = ["front scalar", "front portable", "front avx2", "front avx512"][level as usize];
-            all.push((name, Box::new(Front::new(big, Some(rest), everything).with_level(level))));
+            all.push((name, Box::new(front)));
         }
     }
     let split = WideBvh::with_splits(triangles, Level::best(), SpatialSplits::Always);

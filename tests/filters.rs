@@ -4,6 +4,8 @@
 //! BVH-01 with a filter. `bvh` and `linear` agree by bits; Embree rounds differently, so it may differ by t within 32 ulp
 //! and in which of two triangles at that distance it names. Seeds are fixed.
 
+#[path = "support/fronts.rs"]
+mod fronts;
 #[path = "support/meshes.rs"]
 mod meshes;
 #[path = "support/rng.rs"]
@@ -12,7 +14,7 @@ mod rng;
 use glam::Vec3;
 use meshes::{random_soup, soup};
 use prt::accel::embree::EmbreeAccel;
-use prt::accel::front::{Front, Split};
+use prt::accel::front::Split;
 use prt::accel::geometry::{Candidate, Geometry, HitFilter, Object, Part, Primitives};
 use prt::accel::linear::Linear;
 use prt::accel::wide::WideBvh;
@@ -62,10 +64,7 @@ fn backends(geometry: &Geometry) -> Vec<(String, Box<dyn Accel>)> {
     let levels = [Level::Portable8, Level::Scalar, Level::Avx2, Level::Avx512];
     for level in levels.into_iter().filter(|level| level.is_available()) {
         all.push((level.name().into(), Box::new(WideBvh::with_level(geometry.clone(), level))));
-        let Split { all: everything, front } = Split::new(geometry.clone());
-        if let Some((big, rest)) = front {
-            let [rest, everything] = [rest, everything].map(|g| Box::new(WideBvh::with_level(g, level)));
-            let front = Front::new(big, Some(rest), everything).with_level(level);
+        if let Some(front) = fronts::front(geometry.clone(), level) {
             all.push((format!("front {}", level.name()), Box::new(front)));
         }
     }

@@ -4,6 +4,8 @@
 //! Seeds are fixed. Embree rounds differently and carries rays into objects in another order: t may differ by 1e-4 of the
 //! scene, and 3 rays in a thousand (they graze the soup's edges) may be told apart.
 
+#[path = "support/fronts.rs"]
+mod fronts;
 #[path = "support/meshes.rs"]
 mod meshes;
 #[path = "support/rng.rs"]
@@ -12,7 +14,6 @@ mod rng;
 use glam::{DVec3, Mat3, Quat, Vec3};
 use meshes::{random_soup, sphere};
 use prt::accel::embree::EmbreeAccel;
-use prt::accel::front::{Front, Split};
 use prt::accel::geometry::{
     Affine, Candidate, Geometry, HitFilter, Object, Part, Placement, Primitives, Shape, ShapeHit, ShapeRay,
 };
@@ -204,10 +205,7 @@ fn agree(what: &str, with: With, seed: u64) {
         for (i, (got, want)) in got.iter().zip(&want).enumerate() {
             assert_eq!(got, want, "{what}: {} ray {i}", level.name());
         }
-        let Split { all, front } = Split::new(all.clone());
-        if let Some((big, rest)) = front {
-            let [rest, all] = [rest, all].map(|g| Box::new(WideBvh::with_level(g, level)));
-            let front = Front::new(big, Some(rest), all).with_level(level);
+        if let Some(front) = fronts::front(all.clone(), level) {
             let got = trace("front", &front, &rays, n);
             assert!(got == want, "{what}: front {}", level.name());
         }

@@ -56,16 +56,8 @@ mod tests {
     fn scene(material: Material, lights: usize) -> Scene {
         let mut builder = SceneBuilder::new(0);
         let material = builder.add_material(Material { name: String::from("Glass"), ..material });
-        let mesh = builder.add_mesh(Mesh {
-            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            normals: None,
-            uv_sets: Vec::new(),
-            colors: None,
-            tangents: None,
-            indices: vec![[0, 1, 2]],
-            material,
-            name: String::from("pane"),
-        });
+        let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = builder.add_mesh(Mesh::plain("pane", positions, vec![[0, 1, 2]], material));
         builder.add_instance(Instance { mesh, world_from_object: DMat4::IDENTITY, name: String::from("pane") });
         for i in 0..lights {
             let light = Light::Point { intensity: [1.0; 3] };

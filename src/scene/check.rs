@@ -200,16 +200,7 @@ mod tests {
     use glam::DMat4;
 
     fn scene(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Scene {
-        let mesh = Mesh {
-            positions,
-            normals: None,
-            uv_sets: Vec::new(),
-            colors: None,
-            tangents: None,
-            indices,
-            material: MaterialId(0),
-            name: "m".into(),
-        };
+        let mesh = Mesh::plain("m", positions, indices, MaterialId(0));
         Scene { meshes: vec![mesh], materials: vec![Material::default()], ..Scene::default() }
     }
 

@@ -26,3 +26,19 @@ pub struct Mesh {
     /// For messages: the mesh's name or JSON pointer.
     pub name: String,
 }
+
+impl Mesh {
+    /// One of positions (`[n][3]` metres, object space) and triangles alone: flat shading, nothing to texture it by.
+    pub fn plain(name: &str, positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>, material: MaterialId) -> Self {
+        Self {
+            positions,
+            normals: None,
+            uv_sets: Vec::new(),
+            colors: None,
+            tangents: None,
+            indices,
+            material,
+            name: name.to_owned(),
+        }
+    }
+}

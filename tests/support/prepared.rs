@@ -12,16 +12,7 @@ use simd::{Float, Kernel, Lanes, Level, Mask, Uint};
 
 /// A mesh of positions and triangles alone.
 pub fn mesh(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Mesh {
-    Mesh {
-        positions,
-        normals: None,
-        uv_sets: Vec::new(),
-        colors: None,
-        tangents: None,
-        indices,
-        material: MaterialId(0),
-        name: String::from("mesh"),
-    }
+    Mesh::plain("mesh", positions, indices, MaterialId(0))
 }
 
 /// `mesh` placed by each of `places`.

@@ -53,16 +53,8 @@ pub fn white_dielectric(roughness: f32) -> Material {
 
 /// Adds a quadrilateral; counter-clockwise corners seen from its front.
 pub fn add_quad(builder: &mut SceneBuilder, corners: [[f32; 3]; 4], material: MaterialId) {
-    let mesh = builder.add_mesh(Mesh {
-        positions: corners.to_vec(),
-        normals: None,
-        uv_sets: Vec::new(),
-        colors: None,
-        tangents: None,
-        indices: vec![[0, 1, 2], [0, 2, 3]],
-        material,
-        name: String::from("quad"),
-    });
+    let indices = vec![[0, 1, 2], [0, 2, 3]];
+    let mesh = builder.add_mesh(Mesh::plain("quad", corners.to_vec(), indices, material));
     builder.add_instance(Instance { mesh, world_from_object: DMat4::IDENTITY, name: String::from("quad") });
 }
 
