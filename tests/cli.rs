@@ -62,7 +62,7 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--exposure", "nan", "from -100 to 100"),
         ("--exposure", "automatic", "must be auto or a number"),
         ("--tonemap", "filmic", "neutral, agx, aces, srgb"),
-        ("--brdf", "full", "not built yet"),
+        ("--brdf", "half", "full, appendix-b"),
         ("--default-light", "studio", "auto, on, off"),
         ("--integrator", "ao", "not built yet"),
         ("--exr", "double", "float, half"),

@@ -53,6 +53,18 @@ fn what_cannot_be_read_is_code_3_and_the_others_are_verified() {
 }
 
 #[test]
+fn materials_of_a_scene_pass_and_random_ones_are_for_the_built_in_ones() {
+    let args = ["materials", &scene(), "--samples", "2000", "--seed", "3"];
+    let (code, stdout, stderr) = verify(&args);
+    assert_eq!(code, 0, "{stdout}{stderr}");
+    assert!(stdout.contains("passed"), "{stdout}");
+    let (code, _, stderr) = verify(&["materials", &scene(), "--random", "2"]);
+    assert!(code == 2 && stderr.contains("--random adds to the built-in materials"), "{code} {stderr}");
+    let (code, _, stderr) = verify(&["hits", &scene(), "--samples", "2000"]);
+    assert!(code == 2 && stderr.contains("samples"), "{code} {stderr}");
+}
+
+#[test]
 fn what_is_not_built_is_refused_by_name() {
     for what in ["light", "lens", "shapes", "output"] {
         let (code, _, stderr) = verify(&[what]);

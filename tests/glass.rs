@@ -11,7 +11,7 @@ use glam::{DMat4, DVec3};
 use prt::light::{Environment, Light};
 use prt::material::Material;
 use prt::material::extensions::{Transmission, Volume};
-use prt::render::{Brdf, RenderSettings};
+use prt::render::{Brdf, DefaultLight, RenderSettings};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
 use prt::texture::Param;
@@ -26,7 +26,9 @@ const BIAS: f64 = 5e-3;
 const FAULT: f64 = 1.02;
 
 fn options(spp: u32) -> RenderSettings {
-    RenderSettings { brdf: Brdf::default(), max_bounces: Some(64), ..settings(8, spp, 0) }
+    // What reflects shows nothing: no studio.
+    let default_light = DefaultLight::Off;
+    RenderSettings { brdf: Brdf::default(), max_bounces: Some(64), default_light, ..settings(8, spp, 0) }
 }
 
 /// What the picture shows over seeds, per channel, against `value`.

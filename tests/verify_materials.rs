@@ -39,7 +39,7 @@ fn lambert(fault: Fault) -> impl Scatterer {
             Fault::Negative if wi[2] > 0.999 => -cosine,
             _ => cosine,
         };
-        let pdf = if fault == Fault::Density { cosine * (0.9 + 0.15 * wi[2]) } else { cosine };
+        let pdf = if fault == Fault::Density { cosine * (0.4 + 0.9 * wi[2]) } else { cosine };
         Evaluated { f_cos: [value; 3], pdf }
     };
     let sample = move |wo: [f32; 3], u: [f32; 3]| {

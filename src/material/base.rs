@@ -8,9 +8,9 @@
 //! diffuse base gets what the layer leaves, in both directions: reciprocal, and white over white is white.
 
 use super::bsdf::{BsdfValue, View};
-use super::energy::{Brdf, Energy, Row, Stretched};
+use super::energy::{Brdf, Energy, Row, Stretched, again};
 use super::film::Film;
-use super::lobes::fresnel::dielectric;
+use super::lobes::fresnel::{dielectric, normal_incidence};
 use super::lobes::ggx::{Visible, distribution, masking};
 use super::surface::Surface;
 use crate::math::lanes::{cos_sin_2pi, lerp, pow5, safe_sqrt};
@@ -241,8 +241,8 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                 let tinted =
                     extras.diffuse_transmission_color * this.diffuse_white(opaque, share, shadowed, shadowed_mean);
                 // The boundary's reflectance against what is before it, with the colour it has against air.
-                let own = reflectance::<L>(ior).max(L::F::splat(1e-12));
-                let f0 = f0.scale(reflectance::<L>(eta) / own).min(V3::splat([1.0; 3]));
+                let own = normal_incidence::<L>(ior).max(L::F::splat(1e-12));
+                let f0 = f0.scale(normal_incidence::<L>(eta) / own).min(V3::splat([1.0; 3]));
                 this.through = Some(Through {
                     f0,
                     tint: base,
@@ -364,7 +364,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     fn rise(&self, c: L::F, ior: L::F, s5: L::F) -> L::F {
         let (zero, one) = (L::F::zero(), L::F::one());
         if self.is_full {
-            let own = reflectance::<L>(ior);
+            let own = normal_incidence::<L>(ior);
             let exact = (dielectric::<L>(c, ior) - own) / (one - own);
             return zero.or_else(ior.eq(one), exact).or_else(ior.gt(zero), s5);
         }
@@ -595,25 +595,4 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     pub fn has_specular(&self) -> bool {
         self.has_specular || self.through.is_some()
     }
-}
-
-/// Reflectance at normal incidence of index `eta`.
-#[inline(always)]
-fn reflectance<L: Lanes>(eta: L::F) -> L::F {
-    let one = L::F::one();
-    let r = (eta - one) / (eta + one);
-    r * r
-}
-
-/// Reflectance of what is reflected more than once, for the mean Fresnel reflectance `f` and mean albedo `e`.
-#[inline(always)]
-fn again<L: Lanes>(f: V3<L>, e: L::F) -> V3<L> {
-    let one = L::F::one();
-    let x = again_of::<L>(f.x, e, one);
-    V3::new(x, again_of::<L>(f.y, e, one), again_of::<L>(f.z, e, one))
-}
-
-#[inline(always)]
-fn again_of<L: Lanes>(f: L::F, e: L::F, one: L::F) -> L::F {
-    f * f * e / (one - f * (one - e)).max(L::F::splat(1e-6))
 }

@@ -389,3 +389,16 @@ impl<L: Lanes> Stretched<L> {
         ((ax * ax * x2 + ay * ay * y2) / all).sqrt().max(ax.min(ay))
     }
 }
+
+/// Reflectance of what is reflected more than once, for the mean Fresnel reflectance `f` and mean albedo `e`.
+#[inline(always)]
+pub fn again<L: Lanes>(f: V3<L>, e: L::F) -> V3<L> {
+    let one = L::F::one();
+    let x = again_of::<L>(f.x, e, one);
+    V3::new(x, again_of::<L>(f.y, e, one), again_of::<L>(f.z, e, one))
+}
+
+#[inline(always)]
+fn again_of<L: Lanes>(f: L::F, e: L::F, one: L::F) -> L::F {
+    f * f * e / (one - f * (one - e)).max(L::F::splat(1e-6))
+}

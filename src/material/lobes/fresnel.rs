@@ -28,6 +28,14 @@ pub fn dielectric<L: Lanes>(cos_i: L::F, eta: L::F) -> L::F {
     one.or_else(g2.lt(L::F::zero()), reflectance.min(one))
 }
 
+/// Reflectance at normal incidence of index `eta`.
+#[inline(always)]
+pub fn normal_incidence<L: Lanes>(eta: L::F) -> L::F {
+    let one = L::F::one();
+    let r = (eta - one) / (eta + one);
+    r * r
+}
+
 /// Schlick's approximation with full reflection at grazing angles: `f0 + (1 - f0)(1 - cos)^5`, per colour.
 #[inline(always)]
 pub fn schlick<L: Lanes>(f0: V3<L>, cos: L::F) -> V3<L> {

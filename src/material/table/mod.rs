@@ -24,6 +24,9 @@ const GLOSSY: u32 = 64;
 /// The flags from here on are those of [`extras`].
 const EXTRAS_SHIFT: u32 = 8;
 
+/// Indices of refraction above this reflect all but 4e-6 at normal incidence: as good as 0, which stands for infinite.
+const LARGEST_IOR: f32 = 1e6;
+
 /// Eight 16-byte records a material.
 ///
 /// | record | x | y | z | w |
@@ -98,7 +101,8 @@ impl MaterialTable {
         let mut id = |t| f32::from_bits(textures.bind(t));
         let ([r, g, b], [er, eg, eb]) = (m.base_color.factor, m.emission.factor);
         // KHR_materials_ior: ior 0 stands for infinite, which reflects everything.
-        let reflectance = ((m.ior - 1.0) / (m.ior + 1.0)).powi(2);
+        let ior = if m.ior > LARGEST_IOR { 0.0 } else { m.ior };
+        let reflectance = ((ior - 1.0) / (ior + 1.0)).powi(2);
         let f0 = m.specular_color.factor.map(|c| reflectance * c);
         let metallic = if shares { None } else { m.metallic.texture };
         let bump = if m.bump.factor == 0.0 { None } else { m.bump.texture };
@@ -111,7 +115,7 @@ impl MaterialTable {
             [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
             [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(bump)],
             [cutoff, m.bump.factor, id(plain_bump), 0.0],
-            [f32::from_bits(place), m.ior, f32::from_bits(self.energy.class(m.ior)), 0.0],
+            [f32::from_bits(place), ior, f32::from_bits(self.energy.class(ior)), 0.0],
         ]);
         let textures = [
             m.base_color.texture,

@@ -16,6 +16,8 @@ const NARROW: f64 = 0.05;
 
 /// See [`Side::domains`].
 const MOST_APART: f64 = 5.0;
+const NARROWEST: f64 = 1e-3;
+const LOWEST: f32 = 0.01;
 
 /// A surface with the viewer on one side of it.
 pub struct Side<'a> {
@@ -130,15 +132,16 @@ impl<'a> Side<'a> {
     }
 
     /// Where samples are counted: all directions, or the narrow lobes above and below. Nothing where a narrow lobe is
-    /// together with one [`MOST_APART`] times as wide: no grid resolves both.
-    pub fn domains(&self) -> Vec<(Domain, Option<bool>)> {
+    /// together with one [`MOST_APART`] times as wide: no grid resolves both; nor where the narrow one is of alpha below
+    /// [`NARROWEST`] or seen at a cosine below [`LOWEST`], where the integral of the density is not good enough in f32.
+    pub fn domains(&self, wo: [f32; 3]) -> Vec<(Domain, Option<bool>)> {
         let lobes = self.lobes();
         let alphas = || lobes.iter().flatten().copied();
         let (least, most) = (alphas().fold(1.0, f64::min), alphas().fold(0.0, f64::max));
         if least >= NARROW {
             return vec![(Domain::Sphere, None)];
         }
-        if most > MOST_APART * least {
+        if most > MOST_APART * least || least < NARROWEST || wo[2] < LOWEST {
             return Vec::new();
         }
         let alpha = [least; 2];

@@ -1,0 +1,86 @@
+//! The front by itself.
+
+use super::*;
+use crate::accel::Triangles;
+
+#[test]
+fn scenes_too_large_for_a_second_tree_have_no_front() {
+    let scene = |n: usize| Triangles {
+        positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.001, 0.0, 0.0]],
+        indices: [[0, 1, 2]].into_iter().chain(std::iter::repeat_n([0, 3, 0], n - 1)).collect(),
+    };
+    assert!(Split::new(scene(MOST_TWICE)).front.is_some_and(|(big, _)| big.triangles.len() == 1));
+    assert!(Split::new(scene(MOST_TWICE + 1)).front.is_none());
+}
+
+#[test]
+fn bvh02_rays_along_a_face_of_the_box_of_the_rest_go_on() {
+    let quad = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 2.0], [-1.0, 1.0, 2.0]];
+    let wall = [[-50.0, -50.0, 9.0], [50.0, -50.0, 9.0], [0.0, 50.0, 9.0]];
+    let positions = quad.into_iter().chain(wall).collect();
+    let (big, _) = Split::new(Triangles {
+        positions,
+        indices: (0..40).map(|_| [0, 1, 2]).chain((0..40).map(|_| [0, 2, 3])).chain([[4, 5, 6]]).collect(),
+    })
+    .front
+    .expect("a wall");
+    let rest = big.rest.expect("the quad");
+    // In the planes of all six faces; zeroes of both signs.
+    let mut rays = RayBatch::new(64);
+    let mut n = 0;
+    for (axis, side) in [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)] {
+        for along in (0..3).filter(|&along| along != axis) {
+            for zero in [0.0, -0.0] {
+                let (mut o, mut d) = ([0.0, 0.0, 1.0], [zero; 3]);
+                (o[axis], o[along], d[along]) = (rest[side][axis], -30.0, 1.0);
+                rays.set(n, o.into(), d.into(), f32::INFINITY);
+                n += 1;
+            }
+        }
+    }
+    #[derive(Clone, Copy)]
+    struct Count<'a>(&'a RayBatch, [[f32; 3]; 2], usize);
+    impl Kernel for Count<'_> {
+        type Output = usize;
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) -> usize {
+            let Self(rays, rest, n) = self;
+            let mut count = 0;
+            for at in (0..n).step_by(L::N) {
+                let packet = Packet::<L>::load(rays, at, L::M::first(n - at));
+                count += packet.meets(&rest, packet.t_max).count();
+            }
+            count
+        }
+    }
+    for level in [Level::Scalar, Level::Portable8, Level::Avx2, Level::Avx512] {
+        if level.is_available() {
+            assert_eq!(dispatch(level, Count(&rays, rest, n)), n, "{}", level.name());
+        }
+    }
+}
+
+#[test]
+fn shadow_rays_go_to_the_front_only_where_many_meet_nothing_else() {
+    // A wall, and 100 small triangles about the origin.
+    let small = |k: u32| [0, 1, 2].map(|i| 3 + (k + i) % 3);
+    let positions = vec![
+        [-9.0, -9.0, 5.0],
+        [9.0, -9.0, 5.0],
+        [0.0, 9.0, 5.0],
+        [-0.1, -0.1, 0.0],
+        [0.1, -0.1, 0.05],
+        [0.0, 0.1, -0.05],
+    ];
+    let indices = [[0, 1, 2]].into_iter().chain((0..100).map(small)).collect();
+    let (big, _) = Split::new(Triangles { positions, indices }).front.expect("a wall");
+    let mut rays = RayBatch::new(1024);
+    for share in [0, 100] {
+        for i in 0..1024 {
+            let x = if i * 100 < share * 1024 { 3.0 } else { 0.0 };
+            rays.set(i, glam::Vec3::new(x, 0.0, -5.0), glam::Vec3::Z, 1e9);
+        }
+        assert_eq!(dispatch(Level::best(), Pays { big: &big, rays: &rays, n: 1024 }), share == 100);
+    }
+}
