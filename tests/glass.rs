@@ -296,9 +296,9 @@ fn bsdf11_thin_panes_tint_the_light_of_a_point_exactly() {
         let mu = place.normalize().y;
         let once = 0.6 / std::f64::consts::PI * 100.0 * mu / place.length_squared();
         for pixel in shoot(&scene, &RenderSettings { max_bounces: Some(0), ..options(4) }).pixels {
-            for channel in 0..3 {
+            for (channel, shown) in pixel.into_iter().enumerate() {
                 let tint: f64 = panes.iter().map(|p| (1.0 - fresnel(mu, 1.5)) * f64::from(p.0[channel])).product();
-                let (shown, value) = (f64::from(pixel[channel]), once * tint);
+                let (shown, value) = (f64::from(shown), once * tint);
                 assert!((shown / value - 1.0).abs() < 1e-4, "{count} panes: {shown} instead of {value}");
             }
         }

@@ -417,7 +417,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {
         let (zero, one) = (L::F::zero(), L::F::one());
         let cosine_pdf = self.diffuse_cosine(wi).max(zero) * L::F::splat(FRAC_1_PI);
-        if !self.has_specular && !(RICH && self.through.is_some()) {
+        if !(self.has_specular || RICH && self.through.is_some()) {
             return BsdfValue { f_cos: self.diffuse.scale(cosine_pdf), pdf: cosine_pdf };
         }
         let cosine_pdf = cosine_pdf.masked(self.is_seen);
@@ -520,7 +520,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         if self.has_split {
             diffuse = Frame::around(self.diffuse_normal).to_world(diffuse).or_else(self.is_split, diffuse);
         }
-        if !self.has_specular && !(RICH && self.through.is_some()) {
+        if !(self.has_specular || RICH && self.through.is_some()) {
             let valid = diffuse.z.gt(zero);
             return BaseSample {
                 wi: diffuse,

@@ -1,4 +1,4 @@
-//! The evaluated closure: metal and roughness over all lanes ([`Base`]), and lanes of other materials one by one
+//! The evaluated closure: metal and roughness over all lanes (`Base`), and lanes of other materials one by one
 //! ([`Layered`]).
 //!
 //! Directions are world space here and local in the lobes.

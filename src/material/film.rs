@@ -81,9 +81,9 @@ impl<L: Lanes> Film<L> {
     #[inline(always)]
     fn mix(&self, shares: [L::F; FILM_NODES], metal: V3<L>, layer: V3<L>, weight: L::F) -> (V3<L>, V3<L>) {
         let (mut over_metal, mut over_layer) = (V3::zero(), V3::zero());
-        for k in 0..FILM_NODES {
-            over_metal = self.metal_at_nodes[k].mul_add(shares[k], over_metal);
-            over_layer = self.at_nodes[k].mul_add(shares[k], over_layer);
+        for ((share, metal), layer) in shares.into_iter().zip(&self.metal_at_nodes).zip(&self.at_nodes) {
+            over_metal = metal.mul_add(share, over_metal);
+            over_layer = layer.mul_add(share, over_layer);
         }
         (metal.lerp(over_metal, self.factor), layer.lerp(over_layer.scale(weight), self.factor))
     }
@@ -93,8 +93,8 @@ impl<L: Lanes> Film<L> {
     pub fn largest(&self, energy: &Energy, row: &Row<L>, mu: L::F, layer: L::F, weight: L::F) -> L::F {
         let shares = energy.film_shares(row, mu);
         let mut over_layer = V3::zero();
-        for k in 0..FILM_NODES {
-            over_layer = self.at_nodes[k].mul_add(shares[k], over_layer);
+        for (share, layer) in shares.into_iter().zip(&self.at_nodes) {
+            over_layer = layer.mul_add(share, over_layer);
         }
         lerp(layer, over_layer.max_component() * weight, self.factor)
     }

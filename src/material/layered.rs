@@ -1,7 +1,7 @@
 //! The closure of one lane whose material has more than metal and roughness: the lobes that few materials use are shaded
 //! one lane at a time, so that the others' kernels stay small.
 //!
-//! A coat lies over the sheen, that over the base ([`Base`], or the Disney BRDF of 2012). Each takes from what is below it
+//! A coat lies over the sheen, that over the base (`Base`, or the Disney BRDF of 2012). Each takes from what is below it
 //! what it reflects itself.
 
 use super::base::Base;

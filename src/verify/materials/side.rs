@@ -132,8 +132,8 @@ impl<'a> Side<'a> {
     }
 
     /// Where samples are counted: all directions, or the narrow lobes above and below. Nothing where a narrow lobe is
-    /// together with one [`MOST_APART`] times as wide: no grid resolves both; nor where the narrow one is of alpha below
-    /// [`NARROWEST`] or seen at a cosine below [`LOWEST`], where the integral of the density is not good enough in f32.
+    /// together with one `MOST_APART` times as wide: no grid resolves both; nor where the narrow one is of alpha below
+    /// `NARROWEST` or seen at a cosine below `LOWEST`, where the integral of the density is not good enough in f32.
     pub fn domains(&self, wo: [f32; 3]) -> Vec<(Domain, Option<bool>)> {
         let lobes = self.lobes();
         let alphas = || lobes.iter().flatten().copied();
