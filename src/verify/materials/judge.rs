@@ -166,7 +166,6 @@ fn energy(scatterer: &dyn Scatterer, wo: [f32; 3], expected: &Expected, effort: 
     let greatest = furnace.albedo.into_iter().fold(0.0, f64::max);
     found.albedo = [least, greatest];
     for (albedo, noise) in furnace.albedo.into_iter().zip(noise) {
-        // NaN is neither more nor less.
         if let Some(most) = expected.energy
             && (albedo.is_nan() || albedo > most + noise)
         {
