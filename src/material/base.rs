@@ -219,6 +219,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             shadowed = layer_toward.max_component() * white + this.layer[1] * lost;
             shadowed_mean = layer_mean.max_component() * mean + this.layer[1] * (one - mean);
             let left = (one - shadowed) / (one - shadowed_mean).max(L::F::splat(1e-4));
+            let left = if RICH { left.max(zero) } else { left };
             this.diffuse = this.diffuse.scale(left * (one - share));
         } else {
             this.diffuse = this.diffuse.scale(one - share);
@@ -277,7 +278,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     #[inline(always)]
     fn diffuse_white(&self, opaque: L::F, share: L::F, shadowed: L::F, shadowed_mean: L::F) -> V3<L> {
         let one = L::F::one();
-        let left = (one - shadowed) / (one - shadowed_mean).max(L::F::splat(1e-4));
+        let left = ((one - shadowed) / (one - shadowed_mean).max(L::F::splat(1e-4))).max(L::F::zero());
         V3::<L>::splat([1.0; 3]).scale(opaque * (one - share) * left)
     }
 
@@ -386,7 +387,9 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         if RICH && let Some(film) = &self.film {
             layer = film.largest(self.energy, &self.row, wi.z, layer, self.weight);
         }
-        one - layer * white - again * (one - white)
+        let left = one - layer * white - again * (one - white);
+        // A film's shares add up to 1 but for rounding.
+        if RICH { left.max(L::F::zero()) } else { left }
     }
 
     /// Coefficients of the specular lobes at the half vector `h` with `c = wo . h`: reflected and transmitted.

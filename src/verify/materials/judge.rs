@@ -111,8 +111,8 @@ impl Expected {
             expected.is_one_way = true;
         }
         if side.has_film() {
-            except("energy within 2 %, white within 8 %: a film's reflectance is taken at eight cosines");
-            (expected.energy, expected.white) = (Some(1.02), expected.white.map(|_| 0.08));
+            except("energy within 2 %, white within 15 %: a film's reflectance is taken at eight cosines");
+            (expected.energy, expected.white) = (Some(1.02), expected.white.map(|_| 0.15));
         }
         if side.is_stretched() {
             except("energy within 4 %, white within 4 %: tables of stretched lobes are coarse");
@@ -167,13 +167,13 @@ fn energy(scatterer: &dyn Scatterer, wo: [f32; 3], expected: &Expected, effort: 
     found.albedo = [least, greatest];
     for (albedo, noise) in furnace.albedo.into_iter().zip(noise) {
         if let Some(most) = expected.energy
-            && (albedo.is_nan() || albedo > most + noise)
+            && !(albedo <= most + noise)
         {
             found.problems.push(format!("gives back {albedo:.5} of the light at {}; allowed: {most}", at(wo)));
             return;
         }
         if let Some(white) = expected.white
-            && (albedo.is_nan() || (albedo - 1.0).abs() > white + noise)
+            && !((albedo - 1.0).abs() <= white + noise)
         {
             let most = format!("1 +- {white}");
             found
