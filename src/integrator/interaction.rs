@@ -6,7 +6,7 @@ use crate::accel::HitBatch;
 use crate::math::{UvSets, V3, robust};
 use crate::shape::placement::Placed;
 use crate::shape::table::{NONE, Triangle, interpolate3};
-use simd::{Float, Lanes, Mask, Uint};
+use simd::{Float, Lanes, Mask, Part, Uint};
 
 /// Where a path hit and how it looks from there.
 pub(super) struct Interaction<L: Lanes> {
@@ -58,43 +58,63 @@ pub(super) fn interact<L: Lanes>(
     primitive: L::U,
     hit: L::M,
 ) -> Interaction<L> {
-    let zero = L::F::zero();
-    let none = L::M::from_bits(0);
-    let triangle = tables.triangles.get::<L>(primitive);
-    let b = [L::F::load(&hits.u, at), L::F::load(&hits.v, at)];
-    let placed = placed::<L>(tables, hits, at, hit);
-    let (triangle, p, offset) = triangle.placed(&placed, triangle.point(b[0], b[1]));
-    let front = wo.dot(triangle.ng).gt(zero);
-    let ng = triangle.ng.or_else(front, -triangle.ng);
-    let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
-    let mut color = V3::splat([1.0; 3]);
-    let (mut origin, mut lifted) = (p, none);
-    if tables.triangles.has_attributes() {
-        let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
-        if has.any() {
-            let mut a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
-            uvs = a.uvs.masked(has);
-            if tables.triangles.has_colors() {
-                color = a.color.or_else(has, color);
-            }
-            if tables.triangles.has_normals() {
-                if let Some(placed) = &placed {
-                    // At the corners, as when a mesh is merged: normals of one length are interpolated.
-                    let [n0, n1, n2] = a.corner_normals;
-                    a.corner_normals = [placed.normal(n0), placed.normal(n1), placed.normal(n2)];
-                    let [n0, n1, n2] = a.corner_normals;
-                    a.normal = interpolate3(n0, n1, n2, b[0], b[1]).or_else(placed.lanes, a.normal);
+    L::outline(Interact { tables, hits, at, wo, primitive, hit })
+}
+
+/// [`interact`].
+struct Interact<'a, L: Lanes> {
+    tables: &'a SceneTables,
+    hits: &'a HitBatch,
+    at: usize,
+    wo: V3<L>,
+    primitive: L::U,
+    hit: L::M,
+}
+
+impl<L: Lanes> Part<L> for Interact<'_, L> {
+    type Output = Interaction<L>;
+
+    #[inline(always)]
+    fn run(self) -> Interaction<L> {
+        let Self { tables, hits, at, wo, primitive, hit } = self;
+        let zero = L::F::zero();
+        let none = L::M::from_bits(0);
+        let triangle = tables.triangles.get::<L>(primitive);
+        let b = [L::F::load(&hits.u, at), L::F::load(&hits.v, at)];
+        let placed = placed::<L>(tables, hits, at, hit);
+        let (triangle, p, offset) = triangle.placed(&placed, triangle.point(b[0], b[1]));
+        let front = wo.dot(triangle.ng).gt(zero);
+        let ng = triangle.ng.or_else(front, -triangle.ng);
+        let (mut uvs, mut normal, mut has_normal) = (UvSets::single(zero, zero), triangle.ng, none);
+        let mut color = V3::splat([1.0; 3]);
+        let (mut origin, mut lifted) = (p, none);
+        if tables.triangles.has_attributes() {
+            let has = hit & !triangle.attributes.eq(L::U::splat(NONE));
+            if has.any() {
+                let mut a = tables.triangles.attributes::<L>(triangle.attributes, b[0], b[1]);
+                uvs = a.uvs.masked(has);
+                if tables.triangles.has_colors() {
+                    color = a.color.or_else(has, color);
                 }
-                let smooth = a.normal.normalized();
-                has_normal = has & a.has_normal & smooth.is_finite();
-                normal = smooth.or_else(has_normal, normal);
-                let height = lift(&triangle, &a.corner_normals, b, front);
-                lifted = has_normal & height.gt(zero);
-                origin = ng.mul_add(height, p).or_else(lifted, p);
+                if tables.triangles.has_normals() {
+                    if let Some(placed) = &placed {
+                        // At the corners, as when a mesh is merged: normals of one length are interpolated.
+                        let [n0, n1, n2] = a.corner_normals;
+                        a.corner_normals = [placed.normal(n0), placed.normal(n1), placed.normal(n2)];
+                        let [n0, n1, n2] = a.corner_normals;
+                        a.normal = interpolate3(n0, n1, n2, b[0], b[1]).or_else(placed.lanes, a.normal);
+                    }
+                    let smooth = a.normal.normalized();
+                    has_normal = has & a.has_normal & smooth.is_finite();
+                    normal = smooth.or_else(has_normal, normal);
+                    let height = lift(&triangle, &a.corner_normals, b, front);
+                    lifted = has_normal & height.gt(zero);
+                    origin = ng.mul_add(height, p).or_else(lifted, p);
+                }
             }
         }
+        Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
     }
-    Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
 }
 
 impl<L: Lanes> Interaction<L> {

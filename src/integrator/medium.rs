@@ -11,7 +11,7 @@ use super::wave::Counters;
 use crate::material::media::{AIR, MediumTable};
 use crate::math::V3;
 use crate::sampler::{Key, dims};
-use simd::{Buffer, Float, Lanes, Mask, Uint};
+use simd::{Buffer, Float, Lanes, Mask, Part, Uint};
 
 /// Volumes that a path may be in at a time; entering one more forgets the outermost.
 pub(super) const DEPTH: usize = 6;
@@ -124,27 +124,7 @@ impl<L: Lanes> Crossing<L> {
         hit: L::M,
         key: &Key<L>,
     ) -> Self {
-        let media = &tables.media;
-        let stack = Stack::<L>::load(&pool.media, at);
-        let inside = MediumTable::inside::<L>(material);
-        let is_boundary = media.is_boundary::<L>(inside, hit);
-        let (before, behind) = stack.across(inside, is_boundary, front);
-        let mut crossing = Self { before, behind, is_boundary, front, inside, eta: L::F::one(), dispersed: None };
-        let mut ior = [media.ior::<L>(behind), media.ior::<L>(before)];
-        if let Some(spectrum) = &tables.spectrum {
-            let own = L::F::load(&pool.wavelength, at);
-            let disperses = media.is_dispersive::<L>(behind) | media.is_dispersive::<L>(before);
-            let lanes = is_boundary & disperses & own.eq(L::F::zero());
-            let mut wavelength = own;
-            if lanes.any() {
-                let dispersed = Dispersed::new(spectrum, key, lanes);
-                wavelength = dispersed.wavelength.or_else(lanes, own);
-                crossing.dispersed = Some(dispersed);
-            }
-            ior = [media.ior_at::<L>(behind, wavelength), media.ior_at::<L>(before, wavelength)];
-        }
-        crossing.eta = (ior[0] / ior[1]).or_else(is_boundary & !behind.eq(before), L::F::one());
-        crossing
+        L::outline(Cross { tables, pool, at, material, front, hit, key })
     }
 
     /// What is left of light that came `distance` to the surface.
@@ -202,6 +182,47 @@ impl<L: Lanes> Crossing<L> {
             }
             wavelength.compress(alive, &mut pool.wavelength, to);
         }
+    }
+}
+
+/// [`Crossing::new`].
+struct Cross<'a, L: Lanes> {
+    tables: &'a SceneTables,
+    pool: &'a PathPool,
+    at: usize,
+    material: L::U,
+    front: L::M,
+    hit: L::M,
+    key: &'a Key<L>,
+}
+
+impl<L: Lanes> Part<L> for Cross<'_, L> {
+    type Output = Crossing<L>;
+
+    #[inline(always)]
+    fn run(self) -> Crossing<L> {
+        let Self { tables, pool, at, material, front, hit, key } = self;
+        let media = &tables.media;
+        let stack = Stack::<L>::load(&pool.media, at);
+        let inside = MediumTable::inside::<L>(material);
+        let is_boundary = media.is_boundary::<L>(inside, hit);
+        let (before, behind) = stack.across(inside, is_boundary, front);
+        let mut crossing = Crossing { before, behind, is_boundary, front, inside, eta: L::F::one(), dispersed: None };
+        let mut ior = [media.ior::<L>(behind), media.ior::<L>(before)];
+        if let Some(spectrum) = &tables.spectrum {
+            let own = L::F::load(&pool.wavelength, at);
+            let disperses = media.is_dispersive::<L>(behind) | media.is_dispersive::<L>(before);
+            let lanes = is_boundary & disperses & own.eq(L::F::zero());
+            let mut wavelength = own;
+            if lanes.any() {
+                let dispersed = Dispersed::new(spectrum, key, lanes);
+                wavelength = dispersed.wavelength.or_else(lanes, own);
+                crossing.dispersed = Some(dispersed);
+            }
+            ior = [media.ior_at::<L>(behind, wavelength), media.ior_at::<L>(before, wavelength)];
+        }
+        crossing.eta = (ior[0] / ior[1]).or_else(is_boundary & !behind.eq(before), L::F::one());
+        crossing
     }
 }
 

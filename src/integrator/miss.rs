@@ -5,22 +5,40 @@ use super::medium::Stack;
 use super::pool::PathPool;
 use super::shade::{add_lanes, load3};
 use crate::math::V3;
-use simd::{Float, Lanes, Mask};
+use simd::{Float, Lanes, Mask, Part};
 
 /// Adds what the environment sends along the rays `at ..` that are `missed`. The power heuristic weighs it against
 /// having sampled the same direction as a light; rays from the camera or a mirror have infinite density and weight 1.
 #[inline(always)]
 pub fn see_environment<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, slot: L::U, missed: L::M) {
-    if !missed.any() {
-        return;
+    if missed.any() {
+        L::outline(See { tables, pool, at, slot, missed });
     }
-    let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
-    let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
-    if tables.media.has_volume() {
-        beta = beta * tables.media.transmittance_from_far(Stack::<L>::load(&pool.media, at).innermost());
+}
+
+/// [`see_environment`].
+struct See<'a, L: Lanes> {
+    tables: &'a SceneTables,
+    pool: &'a mut PathPool,
+    at: usize,
+    slot: L::U,
+    missed: L::M,
+}
+
+impl<L: Lanes> Part<L> for See<'_, L> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self { tables, pool, at, slot, missed } = self;
+        let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
+        let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
+        if tables.media.has_volume() {
+            beta = beta * tables.media.transmittance_from_far(Stack::<L>::load(&pool.media, at).innermost());
+        }
+        let (radiance, pdf): (V3<L>, L::F) = tables.lights.environment::<L>(direction);
+        let ratio = pdf / L::F::load(&pool.prev_pdf, at);
+        let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
+        add_lanes::<L>(pool, slot, (beta * radiance).scale(weight), missed);
     }
-    let (radiance, pdf): (V3<L>, L::F) = tables.lights.environment::<L>(direction);
-    let ratio = pdf / L::F::load(&pool.prev_pdf, at);
-    let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
-    add_lanes::<L>(pool, slot, (beta * radiance).scale(weight), missed);
 }

@@ -6,6 +6,7 @@
 mod closure;
 mod coverage;
 mod dispersion;
+mod emission;
 mod interaction;
 mod light_sample;
 mod medium;

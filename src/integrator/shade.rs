@@ -2,6 +2,7 @@
 
 use super::PathTracer;
 use super::closure::{closure, surface};
+use super::emission::emitted;
 use super::interaction::interact;
 use super::light_sample::{Vertex, queue_light_sample};
 use super::medium::{Crossing, Stack};
@@ -108,19 +109,10 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
 
     if tables.materials.is_emissive() {
-        let mut le: V3<L> = tables.materials.emission(&tables.textures, si.triangle.material, si.front, &si.uvs, hit);
-        if tables.materials.has_coat() {
-            let (material, cos) = (si.triangle.material, si.wo.dot(si.ng));
-            le = le.scale(tables.materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, hit));
-        }
-        let lit = hit & le.max_component().gt(L::F::zero());
+        let prev_pdf = L::F::load(&pool.prev_pdf, at);
+        let (radiance, lit) = emitted(tables, &si, distance, prev_pdf, hit);
         if lit.any() {
-            // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
-            // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
-            let pdf_light = si.triangle.light_density * distance * distance / si.wo.dot(si.triangle.ng).abs();
-            let ratio = pdf_light / L::F::load(&pool.prev_pdf, at);
-            let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
-            add_lanes::<L>(pool, slot, (beta * le).scale(weight), lit);
+            add_lanes::<L>(pool, slot, beta * radiance, lit);
         }
     }
 

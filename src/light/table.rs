@@ -8,7 +8,7 @@ use crate::material::table::MaterialTable;
 use crate::math::{UvSets, V3, distribution, robust};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
-use simd::{Float, Lanes, Mask, Uint};
+use simd::{Float, Lanes, Mask, Part, Uint};
 
 const RECORDS: u32 = 6;
 const TRIANGLE: u32 = 0;
@@ -211,6 +211,12 @@ impl LightTable {
         materials: &MaterialTable,
         textures: &TextureTable,
     ) -> LightSample<L> {
+        L::outline(Sample { lights: self, p, u, triangles, materials, textures })
+    }
+
+    #[inline(always)]
+    fn sample_any<L: Lanes>(&self, sample: Sample<'_, L>) -> LightSample<L> {
+        let Sample { p, u, triangles, materials, textures, .. } = sample;
         let at = self.choose::<L>(u[0]) * L::U::splat(RECORDS);
         let record = [
             at.records(&self.records),
@@ -337,6 +343,25 @@ impl LightTable {
 }
 
 /// A direction of the environment.
+/// [`LightTable::sample`].
+struct Sample<'a, L: Lanes> {
+    lights: &'a LightTable,
+    p: V3<L>,
+    u: [L::F; 3],
+    triangles: &'a TriangleTable,
+    materials: &'a MaterialTable,
+    textures: &'a TextureTable,
+}
+
+impl<L: Lanes> Part<L> for Sample<'_, L> {
+    type Output = LightSample<L>;
+
+    #[inline(always)]
+    fn run(self) -> LightSample<L> {
+        self.lights.sample_any(self)
+    }
+}
+
 #[inline(always)]
 fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: f32, u: [L::F; 2]) -> LightSample<L> {
     let sample = environment.sample::<L>(u);

@@ -128,7 +128,7 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
     /// A direction from the mixture of all lobes, by `u` (direction) and `u_lobe`.
     #[inline(always)]
     pub fn sample(&self, u: [L::F; 2], u_lobe: L::F) -> BsdfSample<L> {
-        let sample = self.sample_base(u, u_lobe);
+        let sample = L::outline(SampleBase { bsdf: self, u, u_lobe });
         if self.layered.is_empty() { sample } else { self.sample_layered(u, u_lobe, sample) }
     }
 
@@ -201,6 +201,22 @@ impl<L: Lanes> Part<L> for EvalBase<'_, '_, L> {
     #[inline(always)]
     fn run(self) -> BsdfValue<L> {
         self.base.eval(self.wi)
+    }
+}
+
+/// [`Bsdf::sample_base`].
+struct SampleBase<'a, 'e, L: Lanes> {
+    bsdf: &'a Bsdf<'e, L>,
+    u: [L::F; 2],
+    u_lobe: L::F,
+}
+
+impl<L: Lanes> Part<L> for SampleBase<'_, '_, L> {
+    type Output = BsdfSample<L>;
+
+    #[inline(always)]
+    fn run(self) -> BsdfSample<L> {
+        self.bsdf.sample_base(self.u, self.u_lobe)
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::{Few, Filter, Image, Texels, Texture, TextureRef, Wrap};
 use crate::math::{UvSets, V3, lanes::lerp};
-use simd::{Float, Lanes, Mask, Uint};
+use simd::{Float, Lanes, Mask, Part, Uint};
 use std::collections::BTreeMap;
 
 /// No texture, in tables.
@@ -201,6 +201,11 @@ impl TextureTable {
     /// The binding `id` at the coordinates that it asks for; a lane whose id is [`NO_TEXTURE`] reads anything.
     #[inline(always)]
     pub fn lookup<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {
+        L::outline(Lookup { textures: self, id, uvs, encoding })
+    }
+
+    #[inline(always)]
+    fn read<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {
         let [first, width, height, flags] = id.records(&self.headers);
         let (first, flags) = (first.to_bits(), flags.to_bits());
         let (width, height) = (width.to_bits(), height.to_bits());
@@ -287,6 +292,23 @@ impl TextureTable {
             Encoding::Linear => V3::new(r, g, b),
         };
         Texel { rgb, a }
+    }
+}
+
+/// [`TextureTable::lookup`].
+struct Lookup<'a, L: Lanes> {
+    textures: &'a TextureTable,
+    id: L::U,
+    uvs: &'a UvSets<L>,
+    encoding: Encoding,
+}
+
+impl<L: Lanes> Part<L> for Lookup<'_, L> {
+    type Output = Texel<L>;
+
+    #[inline(always)]
+    fn run(self) -> Texel<L> {
+        self.textures.read(self.id, self.uvs, self.encoding)
     }
 }
 

@@ -1,0 +1,52 @@
+//! Light of surfaces that a path happens to hit.
+
+use super::SceneTables;
+use super::interaction::Interaction;
+use crate::math::V3;
+use simd::{Float, Lanes, Mask, Part};
+
+/// Radiance that the surfaces of `hit` send back along the ray, weighed against having sampled it as a light, and the
+/// lanes that have any. `distance` (metres) from the last scattering, whose direction had the density `prev_pdf` (1/sr).
+#[inline(always)]
+pub(super) fn emitted<L: Lanes>(
+    tables: &SceneTables,
+    si: &Interaction<L>,
+    distance: L::F,
+    prev_pdf: L::F,
+    hit: L::M,
+) -> (V3<L>, L::M) {
+    L::outline(Emitted { tables, si, distance, prev_pdf, hit })
+}
+
+/// [`emitted`].
+struct Emitted<'a, L: Lanes> {
+    tables: &'a SceneTables,
+    si: &'a Interaction<L>,
+    distance: L::F,
+    prev_pdf: L::F,
+    hit: L::M,
+}
+
+impl<L: Lanes> Part<L> for Emitted<'_, L> {
+    type Output = (V3<L>, L::M);
+
+    #[inline(always)]
+    fn run(self) -> (V3<L>, L::M) {
+        let Self { tables, si, distance, prev_pdf, hit } = self;
+        let (materials, material) = (&tables.materials, si.triangle.material);
+        let mut le: V3<L> = materials.emission(&tables.textures, material, si.front, &si.uvs, hit);
+        let lit = hit & le.max_component().gt(L::F::zero());
+        if !lit.any() {
+            return (le, lit);
+        }
+        if materials.has_coat() {
+            let cos = si.wo.dot(si.ng);
+            le = le.scale(materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, lit));
+        }
+        // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
+        // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
+        let pdf_light = si.triangle.light_density * distance * distance / si.wo.dot(si.triangle.ng).abs();
+        let ratio = pdf_light / prev_pdf;
+        (le.scale(L::F::one() / ratio.mul_add(ratio, L::F::one())), lit)
+    }
+}
