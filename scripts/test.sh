@@ -94,7 +94,7 @@ if [ -n "$long" ]; then
   target/release/prt-batch verify hits scenes/ --rays 100000
   summary+=("verify hits: passed")
   # BSDF-01 to -05, -10.
-  target/release/prt-batch verify materials
+  target/release/prt-batch verify materials --samples 1000000 --random 2000 --seed "$(date +%j)"
   summary+=("verify materials: passed")
   if [ -x scripts/reference_check.sh ]; then
     scripts/reference_check.sh

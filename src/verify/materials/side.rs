@@ -133,18 +133,15 @@ impl<'a> Side<'a> {
 
     /// Where samples are counted: all directions, or the narrow lobes above and below. Nothing where a narrow lobe is
     /// together with one `MOST_APART` times as wide: no grid resolves both; nor where the narrow one is of alpha below
-    /// `NARROWEST`, or the view's cosine below `LOWEST`, where the integral of the density is not good enough in f32.
+    /// `NARROWEST` or seen at a cosine below `LOWEST`, where the integral of the density is not good enough in f32.
     pub fn domains(&self, wo: [f32; 3]) -> Vec<(Domain, Option<bool>)> {
         let lobes = self.lobes();
         let alphas = || lobes.iter().flatten().copied();
         let (least, most) = (alphas().fold(1.0, f64::min), alphas().fold(0.0, f64::max));
-        if wo[2] < LOWEST {
-            return Vec::new();
-        }
         if least >= NARROW {
             return vec![(Domain::Sphere, None)];
         }
-        if most > MOST_APART * least || least < NARROWEST {
+        if most > MOST_APART * least || least < NARROWEST || wo[2] < LOWEST {
             return Vec::new();
         }
         let alpha = [least; 2];
