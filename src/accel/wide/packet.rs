@@ -5,7 +5,8 @@
 //! and batches whose rays part soon, are left to `traverse`. Handing single rays over in the middle of a packet, as
 //! Embree does, lost up to a third of the speed: each is set up again. Asking for the memory of children when they are
 //! pushed: 1.03 to 1.1 times the speed. Testing all children at once against the interval of the packet's rays first (as
-//! Embree does for coherent rays): 1.01 for camera rays, 0.95 for shadow rays; not kept.
+//! Embree does for coherent rays): 1.01 for camera rays, 0.95 for shadow rays; pushing children of shadow rays without
+//! branches: 1.04 in a room, 0.95 at organic shapes and in an interior; not kept.
 //!
 //! 38 Mray/s against 11 with single rays in a room of 910 triangles, but only 1.2 to 1.3 times as fast with 500 000
 //! triangles, where few rays of a packet share a leaf. Shadow rays to a lamp: 1.1 to 1.6 times as fast as single rays.
