@@ -15,7 +15,10 @@ const A: (&str, &str) = ("a.gltf", SCENE);
 
 const TYPED: &[Case] = &[
     ("option-typo", &["a.gltf", "--widht", "5"], &[A]),
-    ("option-unbuilt", &["a.gltf", "--env", "sky.exr"], &[A]),
+    ("option-unbuilt", &["a.gltf", "--f-stop", "2.8"], &[A]),
+    ("env-missing", &["a.gltf", "--env", "sky.exr"], &[A]),
+    ("env-no-picture", &["a.gltf", "--env", "a.gltf"], &[A]),
+    ("env-rotate-alone", &["a.gltf", "--env-rotate", "90"], &[A]),
     ("option-twice", &["a.gltf", "--spp", "1", "--spp", "2"], &[A]),
     ("option-without-value", &["a.gltf", "--spp"], &[A]),
     ("option-with-empty-value", &["a.gltf", "--spp="], &[A]),

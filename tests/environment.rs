@@ -84,8 +84,8 @@ fn numbers(n: usize, seed: u64) -> Vec<[f32; 2]> {
 
 /// A grey map of `texel(column, row)`.
 fn grey(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Environment {
-    let radiance = (0..width * height).map(|i| [texel(i % width, i / width); 3]).collect();
-    Environment { width, height, radiance }
+    let texels = (0..width * height).map(|i| [texel(i % width, i / width); 3]);
+    Environment::new(width, height, texels.collect::<Vec<_>>())
 }
 
 /// Direction of (u, v) in [0, 1] of a map.
@@ -107,6 +107,8 @@ fn maps() -> Vec<(&'static str, Environment)> {
         ("row", grey(9, 1, |x, _| (x % 3) as f32)),
         ("1x1", grey(1, 1, |_, _| 7.0)),
         ("random", grey(24, 12, |x, y| random[(y * 24 + x) as usize])),
+        ("turned", Environment { rotation: 0.3, ..grey(24, 12, |x, y| random[(y * 24 + x) as usize]) }),
+        ("turned all but wholly", Environment { rotation: 1.0_f32.next_down(), ..grey(5, 4, |x, _| (x * x) as f32) }),
         ("studio", prt::light::studio::environment()),
     ]
 }
@@ -198,6 +200,40 @@ fn env_05_a_turned_map_shows_the_same_across_the_seam() {
 }
 
 #[test]
+fn env_05_rotation_is_counter_clockwise_seen_from_above_and_turns_what_is_sampled_too() {
+    // Bright towards +X, which is the centre column.
+    let map = grey(64, 32, |x, _| if (31..=32).contains(&x) { 8.0 } else { 1.0 });
+    for (degrees, towards) in [(0.0, DVec3::X), (90.0, -DVec3::Z), (180.0, -DVec3::X), (270.0, DVec3::Z)] {
+        let table = EnvironmentTable::new(&Environment { rotation: degrees / 360.0, ..map.clone() }).unwrap();
+        for level in levels() {
+            let axes = [DVec3::X, -DVec3::X, DVec3::Z, -DVec3::Z];
+            for (d, radiance, _) in dispatch(level, LookAt(&table, &axes)) {
+                let expected = if d.distance(towards) < 1e-6 { 8.0 } else { 1.0 };
+                assert!((radiance[0] - expected).abs() < 1e-4, "{degrees}: {d} {radiance:?}, {level:?}");
+            }
+            for (d, radiance, pdf) in dispatch(level, SampleAt(&table, &numbers(500, 1))) {
+                let (_, seen, density) = dispatch(level, LookAt(&table, &[d]))[0];
+                // Texels are up to 7 apart and 1/64 of a turn wide.
+                assert!((seen[0] - radiance[0]).abs() < 1e-3, "{degrees}: {d} {radiance:?} {seen:?}");
+                assert!((density - pdf).abs() < 2e-3 * pdf, "{degrees}: {d} {pdf} {density}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_scaled_map_is_as_much_brighter_and_sampled_alike() {
+    let (one, four) = (grey(8, 4, |x, y| (x + y) as f32), grey(8, 4, |x, y| (x + y) as f32));
+    let (one, four) = (EnvironmentTable::new(&one), EnvironmentTable::new(&Environment { scale: 4.0, ..four }));
+    let look =
+        |table: &Option<EnvironmentTable>| dispatch(Level::best(), SampleAt(table.as_ref().unwrap(), &numbers(99, 1)));
+    for (a, b) in look(&one).into_iter().zip(look(&four)) {
+        assert_eq!((a.0, a.1.map(|c| 4.0 * c), a.2), b);
+    }
+    assert!(EnvironmentTable::new(&Environment { scale: 0.0, ..grey(8, 4, |_, _| 1.0) }).is_none());
+}
+
+#[test]
 fn axes_are_those_of_the_conventions_up_to_the_poles() {
     // Red grows towards +X, green towards +Y, blue towards +Z.
     let (width, height) = (256, 128);
@@ -206,7 +242,7 @@ fn axes_are_those_of_the_conventions_up_to_the_poles() {
         (DVec3::ONE + direction(x / f64::from(width), y / f64::from(height))).as_vec3().to_array()
     };
     let table =
-        EnvironmentTable::new(&Environment { width, height, radiance: (0..width * height).map(texel).collect() });
+        EnvironmentTable::new(&Environment::new(width, height, (0..width * height).map(texel).collect::<Vec<_>>()));
     let mut directions = vec![DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
     for e in [1e-3, 1e-6, 1e-9, 1e-20] {
         directions.extend([

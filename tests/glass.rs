@@ -69,7 +69,7 @@ fn pane(color: [f32; 3], roughness: f32) -> Material {
 }
 
 fn white_sky() -> Environment {
-    Environment { width: 4, height: 2, radiance: vec![[1.0; 3]; 8] }
+    Environment::new(4, 2, [[1.0; 3]; 8])
 }
 
 /// Adds a closed box, fronts outwards, `map`ped.

@@ -4,13 +4,13 @@ mod gltf_support;
 mod obj_support;
 
 use gltf_support::{Sample, png};
-use prt::batch::content::{HashCache, hash_sources};
+use prt::batch::content::{Content, HashCache, hash_sources};
 use prt::batch::fingerprint::{CameraOrigin, Fingerprint, Wanted};
 use prt::batch::job::CameraChoice;
 use prt::batch::names::NameTemplate;
 use prt::batch::report::{self, ImageReport, Status};
 use prt::batch::up_to_date::{Why, check};
-use prt::batch::{CameraSource, FileSettings, PictureSize, View};
+use prt::batch::{CameraSource, EnvironmentOrigin, FileSettings, PictureSize, View};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::{LoadOptions, load, obj::ObjUp};
@@ -27,6 +27,7 @@ struct Shot {
     dir: TempDir,
     input: &'static str,
     origin: CameraOrigin,
+    environment: Option<EnvironmentOrigin>,
     camera: usize,
     settings: FileSettings,
 }
@@ -41,6 +42,7 @@ impl Shot {
             dir,
             input,
             origin: CameraOrigin::Input,
+            environment: None,
             camera: 0,
             settings: FileSettings { size: PictureSize::Width(64), ..FileSettings::default() },
         }
@@ -84,6 +86,7 @@ impl Shot {
             input: &self.path(self.input),
             settings: &self.settings,
             origin: &self.origin,
+            environment: self.environment.as_ref(),
             camera: self.camera,
         })
     }
@@ -234,7 +237,7 @@ fn files_that_are_not_of_the_scene_do_not_matter() {
 type Edit = fn(&mut Shot);
 
 /// What matters of both formats, by the option that is named then.
-const MATTERS: [(&str, Edit); 17] = [
+const MATTERS: [(&str, Edit); 20] = [
     ("size 64 wide -> 65 wide", |s| s.settings.size = PictureSize::Width(65)),
     ("size 64 wide -> 64x36", |s| s.settings.size = PictureSize::Exact(64, 36)),
     ("camera 0 -> 1", |s| s.camera = 1),
@@ -251,6 +254,9 @@ const MATTERS: [(&str, Edit); 17] = [
     ("scene default -> 0", |s| s.settings.load.scene = Some("0".into())),
     ("eye none -> 0,0,5", |s| s.origin = CameraOrigin::View(VIEW)),
     ("camera-from none -> ", |s| s.origin = camera_file(s, b"one")),
+    ("env none -> 3 bytes, ", |s| s.environment = Some(environment(0.0, 1.0))),
+    ("env-rotate none -> 90", |s| s.environment = Some(environment(90.0, 1.0))),
+    ("env-scale none -> 2", |s| s.environment = Some(environment(0.0, 2.0))),
     ("yfov none -> 40", |s| s.origin = CameraOrigin::View(VIEW)),
 ];
 
@@ -277,6 +283,10 @@ const DOES_NOT: [Edit; 10] = [
 
 const VIEW: View =
     View { eye: glam::DVec3::new(0.0, 0.0, 5.0), look_at: glam::DVec3::ZERO, up: glam::DVec3::Y, yfov: 40.0 };
+
+fn environment(rotate: f64, scale: f64) -> EnvironmentOrigin {
+    EnvironmentOrigin { content: Content::of(b"sky"), rotate, scale }
+}
 
 /// The cameras of a file that differs from others by `mark`.
 fn camera_file(shot: &Shot, mark: &[u8]) -> CameraOrigin {
@@ -305,6 +315,7 @@ fn every_setting_that_matters_changes_the_fingerprint_and_is_named() {
             let expected = if key == "yfov" { "eye none" } else { says };
             assert!(shot.why().starts_with(&format!("settings changed: {expected}")), "{says}: {}", shot.why());
             (shot.settings, shot.camera, shot.origin) = (settings, 0, CameraOrigin::Input);
+            shot.environment = None;
         }
         shot.check().expect("as it was");
     }

@@ -1,38 +1,60 @@
-//! Cameras that tasks are to be seen by in place of their own.
+//! Cameras and environments that tasks are rendered with in place of their own.
 
 use super::content::HashCache;
-use super::fingerprint::CameraOrigin;
+use super::environment::{FromFile, Maps};
+use super::fingerprint::{CameraOrigin, Wanted};
 use super::run::names_of;
 use super::settings::{FileSettings, Task};
 use crate::camera::Camera;
+use crate::scene::Scene;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The cameras of a task.
+/// What a task is rendered with.
 #[derive(Clone)]
 pub(super) struct Elsewhere {
     /// `None`: its own.
     pub cameras: Option<Arc<[Camera]>>,
     /// Where they come from.
     pub origin: CameraOrigin,
+    /// `None`: its own environment.
+    pub environment: Option<FromFile>,
 }
 
 impl Elsewhere {
+    /// Puts it into the task's `scene`.
+    pub fn replace_in(&self, scene: &mut Scene, settings: &FileSettings) {
+        if let Some(cameras) = &self.cameras {
+            settings.camera_source.replace(scene, cameras);
+        }
+        if let Some(environment) = &self.environment {
+            environment.light(scene);
+        }
+    }
+
+    /// An image of the task, with its camera's place.
+    pub fn wanted<'a>(&'a self, Task { input, settings }: &'a Task, camera: usize) -> Wanted<'a> {
+        let environment = self.environment.as_ref().map(|environment| &environment.origin);
+        Wanted { input: &input.path, settings, origin: &self.origin, environment, camera }
+    }
+
     /// Names of the cameras, if they are not the task's own.
     pub fn names(&self) -> Option<Vec<String>> {
         self.cameras.as_deref().map(names_of)
     }
 }
 
-/// The cameras of each task, read once for all that share settings.
+/// For each task, read once for all that share settings.
 ///
 /// # Errors
-/// They are not to be had, or the chosen one is not among them; the text names the option.
-pub(super) fn cameras_from_elsewhere(tasks: &[Task], hashes: &HashCache) -> Result<Vec<Elsewhere>, String> {
+/// They are not to be had, or the chosen camera is not among them; the text names the option.
+pub(super) fn from_elsewhere(tasks: &[Task], hashes: &HashCache) -> Result<Vec<Elsewhere>, String> {
     let mut known: HashMap<*const FileSettings, Elsewhere> = HashMap::new();
-    let read = |settings: &FileSettings| -> Result<Elsewhere, String> {
+    let mut maps = Maps::default();
+    let mut read = |settings: &FileSettings| -> Result<Elsewhere, String> {
         let (cameras, origin) = CameraOrigin::read(&settings.camera_source, hashes)?;
-        let elsewhere = Elsewhere { cameras: cameras.map(Into::into), origin };
+        let environment = settings.environment.as_ref().map(|source| maps.read(source, hashes)).transpose()?;
+        let elsewhere = Elsewhere { cameras: cameras.map(Into::into), origin, environment };
         if let Some(names) = elsewhere.names() {
             // What is not there is there for no input.
             let source = settings.camera_source.options();

@@ -4,7 +4,6 @@
 use super::content::HashCache;
 use super::describe::{accel_name, default_light_name};
 use super::elsewhere::Elsewhere;
-use super::fingerprint::{CameraOrigin, Wanted};
 use super::job::Plan;
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
@@ -24,7 +23,6 @@ use crate::texture::{Image, Texels};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// What would come of an image.
@@ -206,9 +204,8 @@ pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> R
     let pool = render::pool(settings.threads).map_err(|error| Stop::Usage(format!("--threads: {error}")))?;
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
-    for (task, Elsewhere { cameras, origin }) in elsewhere.iter().enumerate() {
-        let elsewhere = cameras.as_ref();
-        let one = File { run: settings, plan: &plan, task, elsewhere, origin, hashes: &hashes, budget };
+    for (task, elsewhere) in elsewhere.iter().enumerate() {
+        let one = File { run: settings, plan: &plan, task, elsewhere, hashes: &hashes, budget };
         let mut count = |explanation: Explanation| {
             explained.images += 1;
             explained.failing += usize::from(explanation.prospect == Prospect::Fail);
@@ -236,8 +233,7 @@ struct File<'a> {
     run: &'a BatchSettings,
     plan: &'a Plan,
     task: usize,
-    elsewhere: Option<&'a Arc<[Camera]>>,
-    origin: &'a CameraOrigin,
+    elsewhere: &'a Elsewhere,
     hashes: &'a HashCache,
     budget: MemoryBudget,
 }
@@ -268,9 +264,7 @@ impl File<'_> {
         }
         let reading = self.budget.check_loading(&input.path, settings)?;
         let (mut scene, times) = load(&input.path, &settings.load).map_err(|error| error.to_string())?;
-        if let Some(cameras) = self.elsewhere {
-            settings.camera_source.replace(&mut scene, cameras);
-        }
+        self.elsewhere.replace_in(&mut scene, settings);
         Ok((scene, times, reading))
     }
 
@@ -314,8 +308,7 @@ impl File<'_> {
 
     /// Whether an earlier run left what this one would write.
     fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
-        let (input, settings) = (&self.run.tasks[self.task].input.path, self.settings());
-        let wanted = Wanted { input, settings, origin: self.origin, camera };
+        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera);
         let json = match &plan.outputs.json {
             Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
             _ => return,

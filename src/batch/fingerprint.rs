@@ -6,6 +6,7 @@
 
 use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
 use super::develop::Tone;
+use super::environment::EnvironmentOrigin;
 use super::picture::FileOptions;
 use super::settings::FileSettings;
 use super::size::PictureSize;
@@ -61,6 +62,8 @@ pub struct Wanted<'a> {
     pub settings: &'a FileSettings,
     /// Whose cameras, as `settings.camera_source` has it.
     pub origin: &'a CameraOrigin,
+    /// Of `settings.environment`.
+    pub environment: Option<&'a EnvironmentOrigin>,
     /// Which of them, by its place.
     pub camera: usize,
 }
@@ -134,10 +137,11 @@ impl Wanted<'_> {
     /// Everything that determines the pixels but the bytes of the inputs. Structures are taken apart whole, so that a
     /// field that is added to one of them must be put here, or named as one that changes no pixel.
     pub fn pixel_settings(&self) -> Settings {
-        let Self { input, settings, origin, camera } = *self;
-        // Names of files change no pixel; which cameras and from where is said by `origin` and `camera`; `files` comes
-        // after the pixels.
-        let FileSettings { name: _, size, camera_source: _, cameras: _, load, render, files: _ } = settings;
+        let Self { input, settings, origin, environment, camera } = *self;
+        // Names of files change no pixel; which cameras, which environment and from where is said by `origin`, `camera` and
+        // `environment`; `files` comes after the pixels.
+        let FileSettings { name: _, size, camera_source: _, cameras: _, environment: _, load, render, files: _ } =
+            settings;
         let mut lines = Settings::new();
         let mut set = |key: &str, value: String| _ = lines.insert(key.into(), value);
         set(
@@ -159,6 +163,12 @@ impl Wanted<'_> {
                 }
                 set("yfov", yfov.to_string());
             }
+        }
+
+        if let Some(EnvironmentOrigin { content: Content { bytes, blake3 }, rotate, scale }) = environment {
+            set("env", format!("{bytes} bytes, {blake3}"));
+            set("env-rotate", rotate.to_string());
+            set("env-scale", scale.to_string());
         }
 
         // The asset root only decides which files may be read; those that were are listed with their contents.

@@ -123,9 +123,7 @@ impl LoadStage {
         let read = |reading| {
             let load = || load(&input.path, &settings.load).map_err(|error| error.to_string());
             let (mut scene, times) = shared.beside.install(load)?;
-            if let Some(cameras) = &shared.elsewhere[task].cameras {
-                settings.camera_source.replace(&mut scene, cameras);
-            }
+            shared.elsewhere[task].replace_in(&mut scene, settings);
             let names = names_of(&scene.cameras);
             let chosen = settings.cameras.select(&names);
             let chosen = chosen.map_err(|error| format!("{}: {error}", input.path.display()))?;

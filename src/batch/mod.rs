@@ -9,6 +9,7 @@ mod describe;
 mod develop;
 pub mod doctor;
 mod elsewhere;
+mod environment;
 pub mod explain;
 pub mod fingerprint;
 pub mod host;
@@ -33,6 +34,7 @@ mod view;
 mod write_stage;
 
 pub use develop::{Developed, Tone, develop};
+pub use environment::{EnvironmentOrigin, EnvironmentSource};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

@@ -100,7 +100,11 @@ fn brdf_name(brdf: Brdf) -> &'static str {
 
 /// Whether there is light beside the file's own.
 fn light_name(frame: &Frame) -> &'static str {
-    if frame.stats.default_light.used { "studio" } else { "file" }
+    match (frame.stats.default_light.used, frame.stats.environment) {
+        (true, _) => "studio",
+        (_, true) => "environment",
+        _ => "file",
+    }
 }
 
 /// What biases the picture and why; `no` if nothing does.

@@ -6,7 +6,7 @@
 use super::budget::Budget;
 use super::content::HashCache;
 use super::describe::{accel_name, blank};
-use super::elsewhere::{Elsewhere, cameras_from_elsewhere};
+use super::elsewhere::{Elsewhere, from_elsewhere};
 use super::fingerprint::Wanted;
 use super::html;
 use super::job::{Plan, plan};
@@ -144,8 +144,7 @@ impl Shared {
 
     /// What is asked for of a task's camera.
     pub fn wanted(&self, task: usize, camera: usize) -> Wanted<'_> {
-        let Task { input, settings } = &self.settings.tasks[task];
-        Wanted { input: &input.path, settings, origin: &self.elsewhere[task].origin, camera }
+        self.elsewhere[task].wanted(&self.settings.tasks[task], camera)
     }
 
     /// The image as an earlier run left it, if that is what this run would write; else why not.
@@ -269,7 +268,7 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
 /// # Errors
 /// What stops a run before anything is rendered, of what does not depend on this machine.
 pub(super) fn planned(tasks: &[Task], hashes: &HashCache) -> Result<(Vec<Elsewhere>, Plan), String> {
-    let elsewhere = cameras_from_elsewhere(tasks, hashes)?;
+    let elsewhere = from_elsewhere(tasks, hashes)?;
     for Task { settings, .. } in tasks {
         if let (Some(crop), PictureSize::Exact(width, height)) = (settings.render.crop, settings.size) {
             check_crop(crop, width, height)?;

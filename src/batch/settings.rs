@@ -1,5 +1,6 @@
 //! What a run is asked to do: settings of files, of the run, and the pairs of the two that it works off.
 
+use super::environment::EnvironmentSource;
 use super::input::Input;
 use super::job::CameraChoice;
 use super::memory::MemoryLimit;
@@ -24,6 +25,8 @@ pub struct FileSettings {
     pub camera_source: CameraSource,
     /// Which of them.
     pub cameras: CameraChoice,
+    /// What lights it from all around in place of an environment of its own.
+    pub environment: Option<EnvironmentSource>,
     /// How the file is read.
     pub load: LoadOptions,
     /// Everything else about the pictures; width and height are set from `size` for each, threads belong to the run.

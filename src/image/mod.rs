@@ -7,3 +7,4 @@ pub mod exr_read;
 pub mod header;
 pub mod old;
 pub mod png;
+pub mod radiance_map;

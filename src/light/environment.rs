@@ -21,6 +21,8 @@ const MIN_SINE: f32 = 1e-12;
 pub struct EnvironmentTable {
     width: u32,
     height: u32,
+    /// See [`Environment::rotation`].
+    rotation: f32,
     /// `[height + 2][width]`: R, G, B in nits; density in (u, v) over 2 pi^2, so that the density over solid angle is it
     /// by the sine of the polar angle. The first and the last row are the poles: the next row's colours, density 0.
     texels: Vec<[f32; 4]>,
@@ -58,7 +60,8 @@ impl EnvironmentTable {
     pub fn new(environment: &Environment) -> Option<Self> {
         let (w, h) = (environment.width as usize, environment.height as usize);
         assert!(w > 0 && h > 0 && environment.radiance.len() == w * h, "a map has width x height texels");
-        let mean = |t: &[f32; 3]| t.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
+        let factor = environment.scale;
+        let mean = |t: &[f32; 3]| t.iter().map(|&c| f64::from(c * factor)).sum::<f64>() / 3.0;
         let rows: Vec<&[[f32; 3]]> = environment.radiance.chunks(w).collect();
         let sine = |row: usize| (PI * (row as f64 + 0.5) / h as f64).sin();
         // Integrals of a tent over v, the map being 1 high; those of the outer rows end at the poles.
@@ -76,13 +79,17 @@ impl EnvironmentTable {
         let mut table = Self {
             width: environment.width,
             height: environment.height,
+            rotation: environment.rotation,
             texels: Vec::with_capacity(w * (h + 2)),
             rows: Vec::new(),
             columns: Vec::with_capacity(w.next_power_of_two() * h),
             mean_radiance: total / (4.0 * PI),
         };
         let records = |row: usize, scale: f64| {
-            let record = move |t: &[f32; 3]| [t[0], t[1], t[2], (mean(t) * scale / total) as f32];
+            let record = move |t: &[f32; 3]| {
+                let [r, g, b] = t.map(|c| c * factor);
+                [r, g, b, (mean(t) * scale / total) as f32]
+            };
             rows[row].iter().map(record).collect::<Vec<_>>()
         };
         table.texels.extend(records(0, 0.0));
@@ -103,10 +110,10 @@ impl EnvironmentTable {
     /// Radiance (nits) from the unit direction `d`, and the density (1/sr) with which [`Self::sample`] gives it.
     #[inline(always)]
     pub fn lookup<L: Lanes>(&self, d: V3<L>) -> (V3<L>, L::F) {
-        let (half, one) = (L::F::splat(0.5), L::F::one());
+        let one = L::F::one();
         let sine = d.x.mul_add(d.x, d.z * d.z).sqrt().max(L::F::splat(MIN_SINE));
-        // The centre column is +X and u grows towards +Z.
-        let u = angle::turns::<L>(d.x, d.z) + half;
+        // The centre column is +X and u grows towards +Z; what is turned counter-clockwise lies further back.
+        let u = angle::turns::<L>(d.x, d.z) + L::F::splat((0.5 + self.rotation) % 1.0);
         let u = (u - one).or_else(u.ge(one), u);
         self.read(&Place {
             columns: u * L::F::splat(self.width as f32),
@@ -136,7 +143,10 @@ impl EnvironmentTable {
         let north = (y + y).lt(height);
         let rows = y.or_else(north, height - y).max(zero);
         // cos_sin_2pi takes [0, 1): half a turn further than the column's angle, which turns both signs.
-        let (cos_phi, sin_phi) = cos_sin_2pi::<L>(x / width);
+        let turns = x / width - f(self.rotation);
+        let turns = (turns + one).or_else(turns.lt(zero), turns);
+        // A whole turn where 1 was added to nearly nothing.
+        let (cos_phi, sin_phi) = cos_sin_2pi::<L>(zero.or_else(turns.ge(one), turns));
         let (cosine, sine) = cos_sin_2pi::<L>(rows * half / height);
         let sine = sine.max(f(MIN_SINE));
         let (radiance, pdf) = self.read(&Place { columns: x, rows, north, sine });

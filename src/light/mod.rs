@@ -4,6 +4,8 @@ pub mod environment;
 pub mod studio;
 pub mod table;
 
+use std::sync::Arc;
+
 /// Light from all around, infinitely far away: an equirectangular map in world axes.
 #[derive(Clone, Debug)]
 pub struct Environment {
@@ -13,7 +15,18 @@ pub struct Environment {
     pub height: u32,
     /// `[height * width]` linear Rec.709 radiance, nits, finite and >= 0; row 0 is +Y, the centre column +X, and columns
     /// go on towards +Z. Bilinear between texel centres.
-    pub radiance: Vec<[f32; 3]>,
+    pub radiance: Arc<[[f32; 3]]>,
+    /// Turns counter-clockwise about +Y seen from above, `[0, 1)`.
+    pub rotation: f32,
+    /// Factor on the radiance, finite and >= 0.
+    pub scale: f32,
+}
+
+impl Environment {
+    /// A map as it stands.
+    pub fn new(width: u32, height: u32, radiance: impl Into<Arc<[[f32; 3]]>>) -> Self {
+        Self { width, height, radiance: radiance.into(), rotation: 0.0, scale: 1.0 }
+    }
 }
 
 /// A light without size. It shines along the local -Z axis where it has a direction.

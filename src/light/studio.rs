@@ -76,7 +76,7 @@ pub fn environment() -> Environment {
         let d = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin());
         [radiance(d) as f32; 3]
     };
-    Environment { width, height, radiance: (0..width * height).map(texel).collect() }
+    Environment::new(width, height, (0..width * height).map(texel).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! Files to [`Scene`]s, by extension.
 
+mod environment;
 mod estimate;
 mod folders;
 pub mod gltf;
 pub mod obj;
 mod tangents;
 
+pub use environment::load_environment;
 pub use estimate::{LoadEstimate, estimate};
 pub use folders::Folders;
 

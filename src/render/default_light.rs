@@ -149,7 +149,7 @@ mod tests {
         let mut scene = Scene { lights: vec![placed], ..Scene::default() };
         assert!(!used(DefaultLight::Auto, &scene, 0.0, 0.0) && used(DefaultLight::On, &scene, 0.0, 0.0));
         scene.lights.clear();
-        scene.environment = Some(Environment { width: 1, height: 1, radiance: vec![[1.0; 3]] });
+        scene.environment = Some(Environment::new(1, 1, [[1.0; 3]]));
         assert!(!used(DefaultLight::Auto, &scene, 0.0, 0.0) && !used(DefaultLight::On, &scene, 0.0, 0.0));
     }
 

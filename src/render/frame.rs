@@ -129,6 +129,7 @@ pub fn render_prepared(
         lights: tables.lights.len() as u64,
         features,
         default_light: prepared.default_light,
+        environment: tables.lights.has_environment() && !prepared.default_light.used,
         accel: prepared.accel_report,
         lanes,
         warnings,

@@ -181,6 +181,8 @@ const INSTANCE_CONSIDERED: u64 = 16;
 const LIGHT: u64 = 6 * 16 + 4;
 /// A texel of an environment: record and the end of its share.
 const ENVIRONMENT_TEXEL: u64 = 16 + 4;
+/// A texel of the map that it was made from, which stays.
+const MAP_TEXEL: u64 = 12;
 
 impl Machinery {
     fn of(scene: &Scene, settings: &RenderSettings) -> Self {
@@ -204,7 +206,7 @@ impl Machinery {
         lights += scene.lights.len() as u64;
         let texels: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
         let environment = match &scene.environment {
-            Some(own) => own.radiance.len() as u64 * ENVIRONMENT_TEXEL,
+            Some(own) => own.radiance.len() as u64 * (ENVIRONMENT_TEXEL + MAP_TEXEL),
             None if settings.default_light == DefaultLight::Off => 0,
             None => u64::from(studio::SIZE[0] * studio::SIZE[1]) * ENVIRONMENT_TEXEL,
         };

@@ -89,6 +89,8 @@ pub struct RenderStats {
     pub features: Vec<(&'static str, bool)>,
     /// Whether the built-in studio lights the scene, and why.
     pub default_light: DefaultLightReport,
+    /// Whether the scene has an environment of its own, or was given one, that shines.
+    pub environment: bool,
     /// Which backend and why.
     pub accel: AccelReport,
     /// SIMD lanes that shaded: 1, 8 or 16.

@@ -59,9 +59,10 @@ fn clean_environment(scene: &mut Scene) {
     let Some(environment) = &mut scene.environment else { return };
     let size = environment.width as usize * environment.height as usize;
     assert!(size > 0 && environment.radiance.len() == size, "an environment has width x height texels");
-    let bad = |texel: &&mut [f32; 3]| !texel.iter().all(|c| c.is_finite() && *c >= 0.0);
-    let count = environment.radiance.iter_mut().filter(bad).map(|texel| *texel = [0.0; 3]).count();
+    let bad = |texel: &&[f32; 3]| !texel.iter().all(|c| c.is_finite() && *c >= 0.0);
+    let count = environment.radiance.iter().filter(bad).count();
     if count > 0 {
+        environment.radiance = environment.radiance.iter().map(|t| if bad(&t) { [0.0; 3] } else { *t }).collect();
         let text = format!("{count} texels of the environment are negative or not finite: taken as black");
         scene.losses.push(text.clone());
         scene.warnings.push(text);
@@ -240,10 +241,10 @@ mod tests {
     #[test]
     fn texels_that_are_no_radiance_become_black() {
         let radiance = vec![[1.0; 3], [-1.0, 2.0, 3.0], [f32::NAN; 3], [f32::INFINITY, 0.0, 0.0]];
-        let environment = Some(crate::light::Environment { width: 2, height: 2, radiance });
+        let environment = Some(crate::light::Environment::new(2, 2, radiance));
         let mut scene = Scene { environment, ..Scene::default() };
         check(&mut scene);
-        assert_eq!(scene.environment.unwrap().radiance, [[1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(scene.environment.unwrap().radiance[..], [[1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
         assert!(scene.warnings[0].starts_with("3 texels of the environment"), "{:?}", scene.warnings);
     }
 

@@ -4,7 +4,7 @@ use crate::args::{FileArgs, RunArgs};
 use crate::config::{Config, Definition, Layer};
 use clap::ArgMatches;
 use prt::batch::input::expand;
-use prt::batch::{CameraSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
+use prt::batch::{CameraSource, EnvironmentSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
 use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
 use prt::render::RenderSettings;
@@ -130,6 +130,7 @@ pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
         size: args.size.map_or(width, |(width, height)| PictureSize::Exact(width, height)),
         camera_source: camera_source(args)?,
         cameras: args.camera.clone(),
+        environment: environment(args)?,
         load: LoadOptions {
             asset_root: args.asset_root.clone(),
             scene: args.scene.clone(),
@@ -146,6 +147,18 @@ pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
             tone: Tone { exposure: args.exposure, curve: args.tonemap },
         },
     })
+}
+
+fn environment(args: &FileArgs) -> Result<Option<EnvironmentSource>, String> {
+    let lonely = [("--env-rotate", args.env_rotate.is_some()), ("--env-scale", args.env_scale.is_some())];
+    let Some(path) = &args.env else {
+        return match lonely.iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(format!("{option} needs --env FILE, the environment that it is about")),
+            None => Ok(None),
+        };
+    };
+    let (rotate, scale) = (args.env_rotate.unwrap_or(0.0), args.env_scale.unwrap_or(1.0));
+    Ok(Some(EnvironmentSource { path: path.clone(), rotate, scale }))
 }
 
 fn camera_source(args: &FileArgs) -> Result<CameraSource, String> {

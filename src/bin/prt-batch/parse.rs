@@ -73,6 +73,16 @@ pub fn yfov(value: &str) -> Result<f64, String> {
     value.parse().ok().filter(inside).ok_or_else(|| "must be degrees above 0 and below 180".into())
 }
 
+pub fn env_rotate(value: &str) -> Result<f64, String> {
+    let inside = |degrees: &f64| degrees.abs() <= 1e6;
+    value.parse().ok().filter(inside).ok_or_else(|| "must be degrees, such as 90, from -1e6 to 1e6".into())
+}
+
+pub fn env_scale(value: &str) -> Result<f64, String> {
+    let inside = |scale: &f64| (0.0..=1e9).contains(scale);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be a factor from 0 to 1e9".into())
+}
+
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
 }

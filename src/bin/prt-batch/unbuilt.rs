@@ -42,14 +42,6 @@ const OPTIONS: &[Unbuilt] = &[
     ),
     option("Sampling", "texture-lod", "", "Ray-cone level of detail (biased)"),
     option(
-        "Light",
-        "env",
-        "FILE.hdr|.exr",
-        "Equirectangular environment; with it --default-light auto is off [default: none]",
-    ),
-    option("Light", "env-rotate", "DEG", "Its rotation, counter-clockwise about +Y seen from above [default: 0]"),
-    option("Light", "env-scale", "S", "Factor on its radiance [default: 1]"),
-    option(
         "Lens",
         "f-stop",
         "N",

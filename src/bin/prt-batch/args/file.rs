@@ -138,6 +138,22 @@ pub struct FileArgs {
     #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::default_light())]
     #[arg(help_heading = LIGHT)]
     pub default_light: DefaultLight,
+    /// Equirectangular environment; with it --default-light auto is off
+    ///
+    /// Radiance in nits, the centre column +X, columns going on towards +Z. It lights every input in place of an
+    /// environment of its own, and is what the camera sees behind everything. A file that is no such picture is a usage
+    /// error (2); infinite, negative and missing numbers in it are mended with a warning.
+    #[arg(long, value_name = "FILE.hdr|.exr", help_heading = LIGHT, value_hint = ValueHint::FilePath)]
+    pub env: Option<PathBuf>,
+    /// Its rotation, counter-clockwise about +Y seen from above [default: 0]
+    #[arg(long, value_name = "DEG", value_parser = parse::env_rotate, allow_hyphen_values = true)]
+    #[arg(help_heading = LIGHT)]
+    pub env_rotate: Option<f64>,
+    /// Factor on its radiance [default: 1]
+    ///
+    /// From 0 to 1e9.
+    #[arg(long, value_name = "S", value_parser = parse::env_scale, allow_hyphen_values = true, help_heading = LIGHT)]
+    pub env_scale: Option<f64>,
 
     /// Output name from {stem} {parent} {camera} [default: {stem}, with .{camera} if a file has several]
     ///
