@@ -109,7 +109,9 @@ impl Terminal {
 }
 
 fn is_bar(line: &str) -> bool {
-    line.contains("####") || line.contains("----") || line.ends_with(" left") || line.ends_with('%')
+    line.contains("####") || line.contains("----") || line.ends_with(" left")
+        // In the table at the end stands the error.
+        || line.ends_with('%') && !line.starts_with("rendered  ")
 }
 
 /// The terminal at the end of a run, its lines that are not empty, and the exit code; `None` without python3.

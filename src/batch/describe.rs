@@ -2,6 +2,7 @@
 
 use super::report::{self, Accel, ImageReport, Rays};
 use super::settings::FileSettings;
+use crate::film::ErrorEstimate;
 use crate::render::{AccelChoice, DefaultLight, Frame};
 use std::path::Path;
 
@@ -32,6 +33,11 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.mrays_per_s = (stats.render_seconds > 0.0).then(|| total as f64 / stats.render_seconds * 1e-6);
     image.non_finite_samples = Some(stats.non_finite_samples);
     image.truncated = Some(stats.truncated);
+    image.estimated_error = stats.error.map(|ErrorEstimate { value, ci95 }| report::EstimatedError {
+        metric: "sqrt-relmse".into(),
+        value,
+        ci95,
+    });
     image.triangles = Some(stats.triangles);
     image.instances = Some(stats.instances);
     image.placed_instances = Some(stats.placed_instances);

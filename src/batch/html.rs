@@ -125,6 +125,7 @@ fn facts(image: &ImageReport) -> String {
     if let Some(speed) = image.mrays_per_s {
         facts.push(if speed < 10.0 { format!("{speed:.2} Mray/s") } else { format!("{speed:.0} Mray/s") });
     }
+    facts.extend(image.estimated_error.as_ref().map(|error| format!("error {}", error.percent())));
     facts.extend(image.camera.as_ref().map(|camera| format!("camera {camera}")));
     facts.extend(image.frame.map(|frame| format!("frame {frame}")));
     facts.iter().fold(String::new(), |line, fact| line + " · " + fact)

@@ -83,6 +83,9 @@ fn attributes(
         ("prt:truncated", ExrValue::Double(stats.truncated)),
         ("prt:biased", ExrValue::Text(bias_of(frame, settings, clipped))),
     ];
+    if let Some(error) = stats.error {
+        attributes.push(("prt:error", ExrValue::Double(error.value)));
+    }
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }

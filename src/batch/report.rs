@@ -59,8 +59,8 @@ pub struct ImageReport {
     pub seconds: Seconds,
     pub rays: Option<Rays>,
     pub mrays_per_s: Option<f64>,
-    /// Not built.
-    pub estimated_error: Option<()>,
+    /// Null with fewer than four samples a pixel, and for black pictures.
+    pub estimated_error: Option<EstimatedError>,
     pub non_finite_samples: Option<u64>,
     pub truncated: Option<f64>,
     /// Not built (`--clamp`).
@@ -125,6 +125,25 @@ pub struct Accel {
     pub used: Option<String>,
     pub version: Option<String>,
     pub isa: Option<String>,
+}
+
+/// How far the picture is from that of endless samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct EstimatedError {
+    pub metric: String,
+    pub value: f64,
+    pub ci95: [f64; 2],
+}
+
+impl EstimatedError {
+    /// Such as `1.3 %`.
+    pub fn percent(&self) -> String {
+        let percent = 100.0 * self.value;
+        // Two digits are more than its interval says.
+        let decimals = (1.0 - percent.log10().floor()).clamp(0.0, 6.0);
+        format!("{percent:.*} %", if decimals.is_finite() { decimals as usize } else { 0 })
+    }
 }
 
 /// The built-in studio light and why it is on or off.

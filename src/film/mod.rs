@@ -5,6 +5,10 @@
 //! error. Sums are compensated f64: paths of a pixel end in another order when a window is rendered, and its pixels must
 //! still be those of the whole picture.
 
+mod estimate;
+
+pub use estimate::ErrorEstimate;
+
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -141,23 +145,33 @@ impl Film {
     /// When a unit is missing.
     pub fn mean(&self) -> Vec<[f32; 3]> {
         let mut pixels = vec![[0.0; 3]; self.window.area()];
-        for (t, tile) in self.tiles.iter().enumerate() {
-            for i in 0..tile.area() {
-                let (mut sum, mut count) = ([0.0f64; 3], 0.0f64);
-                for block in 0..self.blocks.len() {
-                    let unit = self.sums[block * self.tiles.len() + t].get().expect("every unit was rendered");
-                    for (s, v) in sum.iter_mut().zip(unit[i]) {
-                        *s += f64::from(v);
-                    }
-                    count += f64::from(unit[i][3]);
+        self.each_pixel(|x, y, blocks| {
+            let (mut sum, mut count) = ([0.0f64; 3], 0.0f64);
+            for block in blocks {
+                for (s, v) in sum.iter_mut().zip(block) {
+                    *s += f64::from(v);
                 }
-                let (x, y) =
-                    (tile.x - self.window.x + i as u32 % tile.width, tile.y - self.window.y + i as u32 / tile.width);
-                let pixel = &mut pixels[(y * self.window.width + x) as usize];
-                *pixel = sum.map(|s| (s / count.max(1.0)) as f32);
+                count += f64::from(block[3]);
+            }
+            pixels[y * self.window.width as usize + x] = sum.map(|s| (s / count.max(1.0)) as f32);
+        });
+        pixels
+    }
+
+    /// Calls `with` for each pixel of the window, by its place in it, with its blocks' sums; zeroes for blocks that there
+    /// are none of.
+    fn each_pixel(&self, mut with: impl FnMut(usize, usize, [[f32; 4]; BLOCKS as usize])) {
+        for (t, tile) in self.tiles.iter().enumerate() {
+            let units: Vec<&[[f32; 4]]> = (0..self.blocks.len())
+                .map(|block| &**self.sums[block * self.tiles.len() + t].get().expect("every unit was rendered"))
+                .collect();
+            for i in 0..tile.area() {
+                let mut blocks = [[0.0; 4]; BLOCKS as usize];
+                blocks.iter_mut().zip(&units).for_each(|(block, unit)| *block = unit[i]);
+                let (x, y) = (i % tile.width as usize, i / tile.width as usize);
+                with((tile.x - self.window.x) as usize + x, (tile.y - self.window.y) as usize + y, blocks);
             }
         }
-        pixels
     }
 }
 

@@ -92,6 +92,7 @@ pub fn render_prepared(
         return Err(RenderError::Interrupted);
     }
     let pixels = film.mean();
+    let error = film.error();
     let render_seconds = start.elapsed().as_secs_f64();
 
     let features = features(scene, &prepared);
@@ -123,6 +124,7 @@ pub fn render_prepared(
         non_finite_samples: totals.non_finite,
         non_finite_examples: totals.examples,
         truncated: totals.counters.truncated as f64 / paths as f64,
+        error,
         triangles: prepared.placed.triangles,
         instances: scene.instances.len() as u64,
         placed_instances: prepared.placed.instances,

@@ -77,6 +77,9 @@ pub struct RenderStats {
     pub non_finite_examples: Vec<(u32, u32, u32)>,
     /// Share of paths ended by the bounce limit that is a safety cap (not by `--max-bounces`).
     pub truncated: f64,
+    /// How far the picture is from that of endless samples; `None` with fewer than four samples a pixel, or if it is
+    /// black.
+    pub error: Option<crate::film::ErrorEstimate>,
     /// Triangles that rays can meet, with every instance.
     pub triangles: u64,
     /// Meshes that the file places.

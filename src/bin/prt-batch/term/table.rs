@@ -3,7 +3,7 @@
 use super::image_lines::{name, size};
 use super::style::Paint;
 use super::text::{cut, mrays, pad_end, pad_start, printable, seconds, shorten, width};
-use prt::batch::report::{ImageReport, Status};
+use prt::batch::report::{EstimatedError, ImageReport, Status};
 
 /// How a table is made.
 #[derive(Clone, Copy, Debug)]
@@ -104,10 +104,7 @@ fn row(image: &ImageReport) -> [String; 8] {
     let is_rendered = image.status == Status::Rendered;
     let spp = if is_rendered || image.status == Status::UpToDate { image.spp.to_string() } else { none() };
     let warnings = image.warnings.len();
-    let error = match image.estimated_error {
-        // Not built.
-        None | Some(()) => none(),
-    };
+    let error = image.estimated_error.as_ref().map_or_else(none, EstimatedError::percent);
     [
         image.status.word().to_owned(),
         name(image),
