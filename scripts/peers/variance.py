@@ -2,14 +2,14 @@
 """Variance at equal samples, renderer beside renderer, each against its own expectation.
 
 usage: variance.py SCENE.gltf... [--prt target/release/prt-batch] [--spp 64] [--seeds 8] [--size 160x90] [--bounces 12]
-                   [--peers cycles,cycles-power] [--brdf full|appendix-b] [--keep DIR] [--threads 2]
+                   [--peers cycles,cycles-area] [--brdf full|appendix-b] [--keep DIR] [--threads 2]
 
 Each renderer renders each scene once per seed. A picture's error is its relMSE (compare_exr.py) against the mean of the
 same renderer's other seeds, times (n-1)/n, which takes that mean's own variance off: the expectation is the variance of
 one picture over the squared mean, whatever the renderer's idea of the material is. `trim` leaves the worst 0.1 % of the
 pixels out. +- is the standard error of the mean over the seeds. ratio = ours / the peer's: at most 1 is the bar.
 
-Peers: `cycles` with its light tree, `cycles-power` with lights chosen by power. Both with Blender's multiple-scattering
+Peers: `cycles` with its light tree, `cycles-area` with emissive triangles chosen by area. Both with Blender's multiple-scattering
 GGX where --brdf is `full`. Pictures in --keep are used again.
 """
 import argparse
@@ -43,7 +43,7 @@ def render(options, file, scene, name, folder):
     command = [sys.executable, os.path.join(HERE, "render_cycles.py"), file, picture(folder, scene, name, "{seed}"), "--spp", str(options.spp),
                "--size", options.size, "--bounces", str(options.bounces), "--seeds", f"{seeds[0]}-{seeds[-1]}", "--threads", str(options.threads)]
     command += ["--multiscatter"] if options.brdf == "full" else []
-    command += ["--no-light-tree"] if name == "cycles-power" else []
+    command += ["--no-light-tree"] if name == "cycles-area" else []
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 
 

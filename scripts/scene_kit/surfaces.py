@@ -1,5 +1,6 @@
 """The five scenes on which the sampling of materials is measured (scripts/peers/variance.py): one sweep of paper, the same
-softboxes, other surfaces. Only what Blender's importer reads as this program does; no light but emissive panels."""
+softboxes, other surfaces. Only what Blender's importer reads as this program does; no light but emissive panels, which
+are far enough for every place to get about the same from each: how a renderer chooses among lamps shall not count."""
 import math
 import random
 
@@ -7,14 +8,14 @@ from .gltf_file import GltfFile
 from .pictures import byte, cloth, noise, planks, png, tone
 from .rooms import flat_panel
 from .shapes import arc, block, extruded, lathe, panel, sphere
-from .vector import turn
+from .vector import add, cross, scale, sub, turn, unit
 
-KEY, FILL, SKY = (46.0, 41.0, 34.0), (5.0, 6.0, 7.5), (0.9, 1.0, 1.2)
 AROUND = 40
+CENTRE = (0.0, 0.3, 0.0)
 
 
 def studio(stem, sky=False, floor=None):
-    """A sweep under a large softbox to the left, a small bright one to the right and, with `sky`, a wide weak one above."""
+    """A sweep under a large softbox from the left, a small bright one from the right and, with `sky`, a wide weak one above."""
     g = GltfFile(stem)
     paper = floor(g) if floor else g.matte("paper", (0.46, 0.45, 0.44))
     profile = [(4.0, 0.0), (1.0, 0.0), (-0.6, 0.0)]
@@ -22,12 +23,21 @@ def studio(stem, sky=False, floor=None):
     sweep = extruded(profile, 7.0)
     sweep.uvs = [(x, y - z) for x, y, z in sweep.positions]
     put(g, "sweep", sweep, paper)
-    put(g, "fill", flat_panel((-2.6, 0.4, 1.9), (0.7, 0, -1.9), (0, 1.9, 0)), g.lamp("fill", FILL))
-    put(g, "key", flat_panel((1.35, 2.15, 0.3), (0.28, -0.28, 0.2), (-0.2, 0.1, 0.42)), g.lamp("key", KEY))
+    softbox(g, "fill", (-4.6, 2.2, 2.6), 2.2, (22.0, 26.0, 32.0))
+    softbox(g, "key", (2.6, 4.8, 2.2), 0.9, (68.0, 60.0, 50.0))
     if sky:
-        put(g, "sky", flat_panel((-3.0, 3.6, -1.5), (6.0, 0, 0), (0, 0, 5.0)), g.lamp("sky", SKY))
+        softbox(g, "sky", (0.3, 8.5, 0.6), 9.0, (0.9, 1.0, 1.2))
     g.camera("camera", (0.0, 1.25, 3.3), (0.0, 0.33, 0.0), 26)
     return g
+
+
+def softbox(g, name, middle, side, nits):
+    """A square lamp that faces the things."""
+    facing = unit(sub(CENTRE, middle))
+    right = unit(cross((0.0, 1.0, 0.0), facing))
+    up = cross(facing, right)
+    corner = sub(middle, scale(add(right, up), side / 2))
+    put(g, name, flat_panel(corner, scale(right, side), scale(up, side)), g.lamp(name, nits))
 
 
 def put(g, name, shape, material, **where):
