@@ -12,10 +12,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from scene_kit import forest, lights, objects, rooms
+from scene_kit import forest, lights, objects, rooms, surfaces
 
 SCENES = (rooms.cornell, rooms.wall, rooms.knot, lights.lights, lights.punctual, objects.metals, objects.stilllife,
           forest.forest)
+# Written into the folder surfaces/.
+SURFACES = (surfaces.brushed, surfaces.lacquer, surfaces.cloth_scene, surfaces.frosted, surfaces.gloss)
 FOLDER = Path(__file__).resolve().parent.parent / "scenes"
 KEPT = {"README.md"}
 
@@ -27,9 +29,9 @@ def main():
     parser.add_argument("--list", action="store_true")
     args = parser.parse_args()
     made = {}
-    for build in SCENES:
+    for build in SCENES + SURFACES:
         scene = build()
-        files = scene.files()
+        files = {("surfaces/" if build in SURFACES else "") + name: data for name, data in scene.files().items()}
         made.update(files)
         if args.list:
             size = sum(map(len, files.values())) / 1e6
@@ -37,13 +39,13 @@ def main():
     if args.list:
         return 0
     if args.check:
-        found = {p.name: p.read_bytes() for p in args.out.iterdir() if p.is_file() and p.name not in KEPT} if args.out.is_dir() else {}
+        found = {p.relative_to(args.out).as_posix(): p.read_bytes() for p in args.out.rglob("*") if p.is_file() and p.name not in KEPT} if args.out.is_dir() else {}
         wrong = [f"{name}: {'missing' if name not in found else 'not made by this script' if name not in made else 'differs'}"
                  for name in sorted(made.keys() | found.keys()) if made.get(name) != found.get(name)]
         for line in wrong:
             print(f"{args.out.name}/{line}", file=sys.stderr)
         return 1 if wrong else 0
-    args.out.mkdir(parents=True, exist_ok=True)
+    (args.out / "surfaces").mkdir(parents=True, exist_ok=True)
     for name, data in made.items():
         (args.out / name).write_bytes(data)
     print(f"{len(made)} files, {sum(map(len, made.values())) / 1e6:.2f} MB in {args.out.name}/")

@@ -108,10 +108,10 @@ class GltfFile:
         primitives = [{"attributes": g[0], "indices": g[1], "material": m} for g, m in parts]
         return self._put("meshes", {"name": name, "primitives": primitives})
 
-    def material(self, name, color=(1.0, 1.0, 1.0), metallic=0.0, roughness=1.0, specular=None, emission=None, double_sided=False, **textures):
+    def material(self, name, color=(1.0, 1.0, 1.0), metallic=0.0, roughness=1.0, specular=None, emission=None, double_sided=False, more=None, **textures):
         """Metallic-roughness material. `color` is linear; `emission` is radiance in nits per channel.
 
-        `textures`: base, metal_rough, normal, emissive = texture numbers.
+        `textures`: base, metal_rough, normal, emissive = texture numbers. `more`: further extensions, as the file has them.
         """
         pbr = {"metallicFactor": metallic, "roughnessFactor": roughness}
         if tuple(color) != (1.0, 1.0, 1.0):
@@ -119,7 +119,7 @@ class GltfFile:
         for key, where in (("base", "baseColorTexture"), ("metal_rough", "metallicRoughnessTexture")):
             if key in textures:
                 pbr[where] = {"index": textures[key]}
-        entry, extensions = {"name": name, "pbrMetallicRoughness": pbr}, {}
+        entry, extensions = {"name": name, "pbrMetallicRoughness": pbr}, dict(more or {})
         for key, where in (("normal", "normalTexture"), ("emissive", "emissiveTexture")):
             if key in textures:
                 entry[where] = {"index": textures[key]}
