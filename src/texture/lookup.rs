@@ -421,7 +421,8 @@ impl<L: Lanes> Part<L> for LevelLookup<'_, L> {
         let place = textures.place::<L>(id, flags, uvs);
         let area: L::F = uvs.footprint(uv_set::<L>(flags)) * texels;
         // The level whose texels are as wide as the footprint, after Akenine-Moller et al. 2019, equation 34; 0 for NaN.
-        let wanted: L::F = (ln::<L>(area.max(zero).min(L::F::splat(f32::MAX))) * L::F::splat(HALF_LOG2_E)).max(zero).min(last);
+        let wanted: L::F =
+            (ln::<L>(area.max(zero).min(L::F::splat(f32::MAX))) * L::F::splat(HALF_LOG2_E)).max(zero).min(last);
         let fine = wanted.floor();
         let weight = wanted - fine;
         let texel = textures.level_number::<L>(first.to_bits() + fine.to_uint(), flags, place, encoding);

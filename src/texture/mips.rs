@@ -83,13 +83,7 @@ impl Span {
 }
 
 /// Mean of the texels under `across` and `down`, of an image `width` texels wide.
-fn mean(
-    texel: impl Fn(usize) -> [f32; 4],
-    width: usize,
-    across: &Span,
-    down: &Span,
-    by_opacity: bool,
-) -> [f32; 4] {
+fn mean(texel: impl Fn(usize) -> [f32; 4], width: usize, across: &Span, down: &Span, by_opacity: bool) -> [f32; 4] {
     // In f64, so that texels of one value have that value as their mean.
     let (mut plain, mut there) = ([0.0_f64; 4], [0.0_f64; 3]);
     for (y, &v) in down.weights.iter().enumerate().filter(|(_, v)| **v > 0.0) {

@@ -131,8 +131,8 @@ pub struct FileArgs {
     pub accel: AccelChoice,
     /// Ray-cone level of detail (biased)
     ///
-    /// Textures are averaged over what a pixel, or a scattered ray, sees of them: little noise at few samples, softer
-    /// textures at any number. See "Texture level of detail" below.
+    /// Textures are averaged over what a pixel, or a scattered ray, sees of them: less noise at few samples, softer
+    /// textures at any number. Emission and opacity are not.
     #[arg(long, help_heading = SAMPLING)]
     pub texture_lod: bool,
 
