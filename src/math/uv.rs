@@ -85,9 +85,9 @@ impl<L: Lanes> UvSets<L> {
         let Some(footprints) = &self.footprints else { return L::F::zero() };
         let mut area = footprints[0];
         if self.n > 1 {
-            for k in 1..MAX_UV_SETS {
-                if k < self.n {
-                    area = footprints[k].or_else(which.eq(L::U::splat(k as u32)), area);
+            for (k, footprint) in footprints.iter().enumerate() {
+                if k > 0 && k < self.n {
+                    area = footprint.or_else(which.eq(L::U::splat(k as u32)), area);
                 }
             }
         }

@@ -271,11 +271,11 @@ impl TriangleTable {
             let flags = a3[3].to_bits();
             at = at + one + L::U::splat(3).or_else(flags.has(HAS_COLORS), L::U::splat(0));
             let more = flags.shr(MORE_UV_SETS_SHIFT);
-            for k in 1..self.uv_sets.min(MAX_UV_SETS) {
+            for (k, set) in areas.iter_mut().enumerate().take(self.uv_sets).skip(1) {
                 let first = at.records(&self.attributes);
                 let second = (at + one).records(&self.attributes);
                 let area = doubled_area::<L>([first[0], first[1]], [first[2], first[3]], [second[0], second[1]]);
-                areas[k] = area.masked(!more.lt(L::U::splat(k as u32)));
+                *set = area.masked(!more.lt(L::U::splat(k as u32)));
                 at = at + one + one;
             }
         }

@@ -16,13 +16,16 @@ use std::collections::BTreeMap;
 /// No texture, in tables.
 pub const NO_TEXTURE: u32 = u32::MAX;
 
+/// A texture, its set of coordinates, the bits of its transform, and what its levels average.
+type BindingKey = (u32, u32, Option<[u32; 6]>, Average);
+
 /// The textures of a scene, ready to be read: each as some material reads it, which is called a binding.
 #[derive(Clone, Debug, Default)]
 pub struct TextureTable {
     /// Per texture of the scene: first word, width, height (as integers' bits), flags.
     textures: Vec<[f32; 4]>,
-    /// The binding of each texture with its set of coordinates, the bits of its transform and what its levels average.
-    bindings: BTreeMap<(u32, u32, Option<[u32; 6]>, Average), u32>,
+    /// The binding of each key.
+    bindings: BTreeMap<BindingKey, u32>,
     /// Per binding: texture, what its levels average.
     bound: Vec<(u32, Average)>,
     /// Per binding: the texture's record with the set of coordinates in its flags.
