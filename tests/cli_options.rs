@@ -79,6 +79,11 @@ fn a_settings_change_says_which_and_force_needs_none() {
     assert!(again(&["--cull-backfaces", "--force"]).contains("16x8  2 spp"));
     let exr = fs::read(root.path().join("renders/a.exr")).unwrap();
     assert!(exr.windows(13).any(|bytes| bytes == b"prt:backfaces"));
+    assert!(!exr.windows(14).any(|bytes| bytes == b"prt:textureLod"));
+    let changed = again(&["--cull-backfaces", "--texture-lod"]);
+    assert!(changed.contains("settings changed: texture-lod none -> on"), "{changed}");
+    let exr = fs::read(root.path().join("renders/a.exr")).unwrap();
+    assert!(exr.windows(14).any(|bytes| bytes == b"prt:textureLod"));
 }
 
 #[test]

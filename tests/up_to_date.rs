@@ -247,6 +247,7 @@ const MATTERS: [(&str, Edit); 18] = [
     ("frame 0 -> 1", |s| s.settings.render.frame = 1),
     ("max-bounces unlimited -> 0", |s| s.settings.render.max_bounces = Some(0)),
     ("cull-backfaces off -> on", |s| s.settings.render.cull_backfaces = true),
+    ("texture-lod none -> on", |s| s.settings.render.texture_lod = true),
     ("filter tent:2 -> box:2", |s| s.settings.render.filter = Filter::Box { width: 2.0 }),
     ("filter tent:2 -> tent:2.0000002", |s| s.settings.render.filter = Filter::Tent { width: 2.0_f32.next_up() }),
     ("default-light auto -> off", |s| s.settings.render.default_light = DefaultLight::Off),

@@ -192,6 +192,7 @@ impl Wanted<'_> {
             frame,
             max_bounces,
             cull_backfaces,
+            texture_lod,
             filter,
             brdf,
             default_light,
@@ -209,6 +210,10 @@ impl Wanted<'_> {
         set("seed", seed.to_string());
         set("frame", frame.to_string());
         set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
+        // Named only where it is on: pictures without it have the fingerprints that they had before there was one.
+        if *texture_lod {
+            set("texture-lod", "on".into());
+        }
         set("cull-backfaces", if *cull_backfaces { "on" } else { "off" }.into());
         set(
             "filter",

@@ -86,6 +86,9 @@ fn attributes(
     if let Some(error) = stats.error {
         attributes.push(("prt:error", ExrValue::Double(error.value)));
     }
+    if settings.texture_lod {
+        attributes.push(("prt:textureLod", ExrValue::Text("cones".into())));
+    }
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }
@@ -113,6 +116,9 @@ fn light_name(frame: &Frame) -> &'static str {
 /// What biases the picture and why; `no` if nothing does.
 fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> String {
     let mut reasons = Vec::new();
+    if settings.texture_lod {
+        reasons.push("textures are averaged over cones around the paths (--texture-lod)".into());
+    }
     if let Some(bounces) = settings.max_bounces {
         reasons.push(format!("paths end after {bounces} scatterings (--max-bounces)"));
     }
@@ -191,6 +197,11 @@ mod tests {
     fn bias_is_named() {
         let (mut frame, mut settings) = (frame(), RenderSettings::default());
         assert_eq!(bias_of(&frame, &settings, None), "no");
+        settings.texture_lod = true;
+        let named = "textures are averaged over cones around the paths (--texture-lod)";
+        assert_eq!(bias_of(&frame, &settings, None), named);
+        assert!(attributes(&frame, &settings, None, None).iter().any(|a| a.0 == "prt:textureLod"));
+        settings.texture_lod = false;
         settings.max_bounces = Some(3);
         frame.stats.non_finite_samples = 7;
         assert_eq!(

@@ -16,6 +16,8 @@ pub struct CameraRays {
     right: [f32; 3],
     /// From the centre to the lower edge of the picture at distance 1.
     down: [f32; 3],
+    /// Side of a pixel at distance 1 along the axis, or of parallel rays anywhere; metres.
+    pixel: f32,
     /// 2 / width and 2 / height.
     per_pixel: [f32; 2],
     /// Rays start on the plane instead of at a point.
@@ -38,6 +40,7 @@ impl CameraRays {
             forward: axis(-m.z_axis.truncate()),
             right: axis(m.x_axis.truncate() * half_height * aspect),
             down: axis(-m.y_axis.truncate() * half_height),
+            pixel: (2.0 * half_height / f64::from(height)) as f32,
             per_pixel: [(2.0 / f64::from(width)) as f32, (2.0 / f64::from(height)) as f32],
             is_parallel,
         }
@@ -57,5 +60,18 @@ impl CameraRays {
         }
         let d = right.mul_add(sx, down.mul_add(sy, forward));
         (origin, d.normalized())
+    }
+
+    /// How wide a pixel's rays are where they start, metres, and by how much they widen, radians: the root of the pixel's
+    /// solid angle. `direction` (unit) is that of a ray.
+    #[inline(always)]
+    pub fn cone<L: Lanes>(&self, direction: V3<L>) -> (L::F, L::F) {
+        let (zero, pixel) = (L::F::zero(), L::F::splat(self.pixel));
+        if self.is_parallel {
+            return (pixel, zero);
+        }
+        // A pixel's area on the picture's plane by cos^3.
+        let cos = direction.dot(V3::splat(self.forward)).max(zero);
+        (zero, pixel * cos * cos.sqrt())
     }
 }

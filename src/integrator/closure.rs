@@ -9,7 +9,7 @@ use crate::material::layered::Layered;
 use crate::material::media::MediumTable;
 use crate::material::surface::Surface;
 use crate::math::bend::let_mirror_leave;
-use crate::math::{Frame, V3};
+use crate::math::{Frame, MAX_UV_SETS, V3};
 use simd::{Float, Lanes, Mask, Part, Scalar, Uint};
 
 /// A surface at a hit, all but directions known.
@@ -59,13 +59,15 @@ pub(super) fn closure<'t, L: Lanes>(
     si.wo.y.store(&mut wo[1], 0);
     si.wo.z.store(&mut wo[2], 0);
     eta.store(&mut etas, 0);
+    let footprints = stored_footprints(si);
     let (mut layered, mut transmits) = (Vec::with_capacity(rich.count()), 0);
     let mut bits = rich.bits();
     while bits != 0 {
         let lane = bits.trailing_zeros() as usize;
         bits &= bits - 1;
         let wo = V3::splat([wo[0][lane], wo[1][lane], wo[2][lane]]);
-        let (one, goes_through) = closure_of_one(tables, hits, at + lane, wo, etas[lane]);
+        let seen = footprints.map(|sets| sets.map(|areas| areas[lane]));
+        let (one, goes_through) = closure_of_one(tables, hits, at + lane, wo, etas[lane], seen);
         transmits |= u32::from(goes_through) << lane;
         layered.push((lane, one));
     }
@@ -99,7 +101,19 @@ impl<'t, L: Lanes> Part<L> for Plain<'_, 't, L> {
     }
 }
 
+/// What each lane sees of its textures in each set of coordinates, if that is asked for.
+#[inline(always)]
+fn stored_footprints<L: Lanes>(si: &Interaction<L>) -> Option<[[f32; 16]; MAX_UV_SETS]> {
+    let footprints = si.uvs.footprints()?;
+    let mut stored = [[0.0; 16]; MAX_UV_SETS];
+    for (stored, areas) in stored.iter_mut().zip(footprints) {
+        areas.store(stored, 0);
+    }
+    Some(stored)
+}
+
 /// The closure of hit `at` seen from `wo`, whose material has what only some have, and whether light may get through it.
+/// `footprints`: see [`crate::math::UvSets::with_footprints`].
 #[inline(never)]
 fn closure_of_one<'t>(
     tables: &'t SceneTables,
@@ -107,10 +121,18 @@ fn closure_of_one<'t>(
     at: usize,
     wo: V3<Scalar>,
     eta: f32,
+    footprints: Option<[f32; MAX_UV_SETS]>,
 ) -> (Layered<'t>, bool) {
     let active = <Scalar as Lanes>::M::first(1);
     let primitive = <Scalar as Lanes>::U::load(&hits.primitive, at);
-    let si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    let mut si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    if let Some(footprints) = footprints {
+        // Shadow rays go through thin glass without a cone, and what they find must be what paths find.
+        let inside = MediumTable::inside::<Scalar>(si.triangle.material);
+        if !tables.media.is_thin_glass::<Scalar>(inside, active).any() {
+            si.uvs = si.uvs.with_footprints(footprints.map(<Scalar as Lanes>::F::splat));
+        }
+    }
     let materials = &tables.materials;
     let surface = materials.rich_surface::<Scalar>(&tables.textures, si.triangle.material, &si.uvs, active);
     let surface = colored(tables, &si, surface);
@@ -147,7 +169,7 @@ pub(super) fn pane(
     if !tables.media.is_thin_glass::<Scalar>(inside, active).any() {
         return None;
     }
-    let (closure, _) = closure_of_one(tables, hits, at, wo, 1.0);
+    let (closure, _) = closure_of_one(tables, hits, at, wo, 1.0, None);
     Some((closure.straight(), si.behind()))
 }
 

@@ -4,6 +4,7 @@
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
 mod closure;
+mod cone;
 mod coverage;
 mod dispersion;
 mod emission;

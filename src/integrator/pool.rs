@@ -41,6 +41,10 @@ pub struct PathPool {
     pub travelled: Buffer<f32>,
     /// Surfaces of thin glass gone straight through, ever.
     pub passes: Buffer<u32>,
+    /// Width of the cone around the path where the ray starts, metres (`cone.rs`).
+    pub cone_width: Buffer<f32>,
+    /// By how much the cone widens, radians.
+    pub cone_spread: Buffer<f32>,
     /// What shadow rays through thin glass need; `None` where there is none.
     pub glass: Option<Box<Glass>>,
     /// Where the path's radiance is.
@@ -88,6 +92,8 @@ impl PathPool {
             wavelength: Buffer::new(0),
             travelled: Buffer::new(0),
             passes: Buffer::new(0),
+            cone_width: Buffer::new(0),
+            cone_spread: Buffer::new(0),
             glass: None,
             slot: ints(),
             radiance: vec![[0.0; 3]; POOL],
@@ -115,6 +121,9 @@ impl PathPool {
         if media.has_thin_glass() && self.glass.is_none() {
             (self.travelled, self.passes) = (Buffer::new(ROOM), Buffer::new(ROOM));
             self.glass = Some(Box::default());
+        }
+        if tables.textures.has_levels() && self.cone_width.is_empty() {
+            (self.cone_width, self.cone_spread) = (Buffer::new(ROOM), Buffer::new(ROOM));
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::PathTracer;
 use super::closure::{closure, surface};
+use super::cone::Cone;
 use super::emission::emitted;
 use super::interaction::interact;
 use super::light_sample::{Vertex, queue_light_sample};
@@ -71,7 +72,14 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let depth = L::U::load(&pool.depth, at);
     let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
     let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
-    let si = interact::<L>(tables, &pool.hits, at, wo, primitive, hit);
+    let mut si = interact::<L>(tables, &pool.hits, at, wo, primitive, hit);
+    let cone = if tables.textures.has_levels() {
+        let cone = Cone::<L>::load(pool, at, L::F::load(&pool.hits.t, at));
+        si.uvs = si.uvs.with_footprints(cone.footprints(tables, &si, hit));
+        Some(cone)
+    } else {
+        None
+    };
     let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
     let mut culled = L::M::from_bits(0);
     if tracer.cull_backfaces {
@@ -204,6 +212,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     if tables.media.has_thin_glass() {
         distance.masked(straight | culled).compress(alive, &mut pool.travelled, to);
         (passes + L::U::splat(1)).or_else(straight, passes).compress(alive, &mut pool.passes, to);
+    }
+    if let Some(cone) = &cone {
+        cone.follow(pool, to, sample.pdf, straight | culled, alive);
     }
     slot.compress(active & !alive, &mut pool.dead, pool.n_dead);
     pool.n_dead += (active & !alive).count();

@@ -201,6 +201,11 @@ impl Kernel for Generate<'_, '_> {
             let x = L::F::load(&pool.rays.ox, at) + tracer.filter.offset::<L>(u[0]);
             let y = L::F::load(&pool.rays.oy, at) + tracer.filter.offset::<L>(u[1]);
             let (origin, direction): (V3<L>, V3<L>) = tracer.camera.ray::<L>(x, y);
+            if tracer.tables.textures.has_levels() {
+                let (width, spread) = tracer.camera.cone::<L>(direction);
+                width.store(&mut pool.cone_width, at);
+                spread.store(&mut pool.cone_spread, at);
+            }
             origin.x.store(&mut pool.rays.ox, at);
             origin.y.store(&mut pool.rays.oy, at);
             origin.z.store(&mut pool.rays.oz, at);

@@ -11,6 +11,8 @@ pub struct UvSets<L: Lanes> {
     sets: [[L::F; 2]; MAX_UV_SETS],
     /// Sets that some lane has; the others are not read.
     n: usize,
+    /// See [`UvSets::with_footprints`].
+    footprints: Option<[L::F; MAX_UV_SETS]>,
 }
 
 impl<L: Lanes> UvSets<L> {
@@ -18,7 +20,7 @@ impl<L: Lanes> UvSets<L> {
     #[inline(always)]
     pub fn single(u: L::F, v: L::F) -> Self {
         let zero = L::F::zero();
-        Self { sets: [[u, v], [zero, zero], [zero, zero], [zero, zero]], n: 1 }
+        Self { sets: [[u, v], [zero, zero], [zero, zero], [zero, zero]], n: 1, footprints: None }
     }
 
     /// Adds set `k`, 1 and up in this order.
@@ -54,5 +56,41 @@ impl<L: Lanes> UvSets<L> {
             }
         }
         [u, v]
+    }
+
+    /// The same coordinates with how much a lane's path sees around them in each set: an area, the square of a width, in
+    /// units of the coordinates. Textures are then read at the level of detail that this asks for, else at level 0.
+    #[inline(always)]
+    #[must_use]
+    pub fn with_footprints(self, footprints: [L::F; MAX_UV_SETS]) -> Self {
+        Self { footprints: Some(footprints), ..self }
+    }
+
+    /// The same coordinates, at which textures are read at level 0.
+    #[inline(always)]
+    #[must_use]
+    pub fn sharp(self) -> Self {
+        Self { footprints: None, ..self }
+    }
+
+    /// What was given to [`UvSets::with_footprints`].
+    #[inline(always)]
+    pub fn footprints(&self) -> Option<&[L::F; MAX_UV_SETS]> {
+        self.footprints.as_ref()
+    }
+
+    /// The footprint in set `which` per lane; 0 where none were given.
+    #[inline(always)]
+    pub fn footprint(&self, which: L::U) -> L::F {
+        let Some(footprints) = &self.footprints else { return L::F::zero() };
+        let mut area = footprints[0];
+        if self.n > 1 {
+            for (k, footprint) in footprints.iter().enumerate() {
+                if k > 0 && k < self.n {
+                    area = footprint.or_else(which.eq(L::U::splat(k as u32)), area);
+                }
+            }
+        }
+        area
     }
 }

@@ -205,6 +205,7 @@ impl Machinery {
         }
         lights += scene.lights.len() as u64;
         let texels: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
+        let levels = Levels::of(scene, settings);
         let environment = match &scene.environment {
             Some(own) => own.radiance.len() as u64 * (ENVIRONMENT_TEXEL + MAP_TEXEL),
             None if settings.default_light == DefaultLight::Off => 0,
@@ -215,13 +216,35 @@ impl Machinery {
         let accel = accel(vertices, triangles, placements, settings.accel);
         let list = lights * (size_of::<(PreparedLight, f64)>() as u64 + 8);
         Self {
-            held: records + texels + environment + lights * LIGHT + placements * PLACEMENT + accel.held,
+            held: records + texels + levels.held + environment + lights * LIGHT + placements * PLACEMENT + accel.held,
             building: geometry
+                + levels.building
                 + (12 * largest).max(list)
                 + scene.instances.len() as u64 * INSTANCE_CONSIDERED
                 + placements * PLACEMENT_BUILDING
                 + accel.building,
         }
+    }
+}
+
+/// What levels of detail take, bytes.
+struct Levels {
+    held: u64,
+    /// Beyond that while they are made.
+    building: u64,
+}
+
+impl Levels {
+    /// As if each image were read in one way only; one that is read both as colour and as numbers has its levels twice.
+    fn of(scene: &Scene, settings: &RenderSettings) -> Self {
+        if !settings.texture_lod {
+            return Self { held: 0, building: 0 };
+        }
+        let bytes = texel_bytes;
+        let held = scene.images.iter().map(|i| bytes(&i.texels).div_ceil(3)).sum();
+        let largest = scene.images.iter().map(|i| 5 * i.texels.len() as u64 + bytes(&i.texels).div_ceil(3)).max();
+        // The means of a level and of the one below it, 16 bytes each texel, and that level as it is kept.
+        Self { held, building: largest.unwrap_or(0) }
     }
 }
 

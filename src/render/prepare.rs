@@ -166,6 +166,9 @@ fn prepare_all(
     let (bounds, origin) = (boxes.scene, boxes.origin());
     let mut textures = TextureTable::new(&scene.textures, &scene.images)?;
     let materials = MaterialTable::new(&scene.materials, &mut textures, settings.brdf);
+    if settings.texture_lod {
+        textures.add_levels(&scene.textures, &scene.images)?;
+    }
     let mut triangles = TriangleTable::with_capacity(count as usize);
     let mut parts = Parts::default();
     let mut lights = Vec::new();

@@ -82,6 +82,8 @@ pub struct RenderSettings {
     pub max_bounces: Option<u32>,
     /// Camera rays pass single-sided surfaces from behind; other rays do not.
     pub cull_backfaces: bool,
+    /// Textures are averaged over cones around the paths; biased.
+    pub texture_lod: bool,
     /// Pixel filter.
     pub filter: Filter,
     /// Microfacet model.
@@ -114,6 +116,7 @@ impl Default for RenderSettings {
             frame: 0,
             max_bounces: None,
             cull_backfaces: false,
+            texture_lod: false,
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),

@@ -254,6 +254,34 @@ impl TriangleTable {
         }
     }
 
+    /// Twice the area of the triangles with attributes `index` in each of their sets of coordinates, in units of these; 0
+    /// in a set that a lane does not have. The table must have some attributes.
+    #[inline(always)]
+    pub fn uv_areas<L: Lanes>(&self, index: L::U) -> [L::F; MAX_UV_SETS] {
+        let one = L::U::splat(1);
+        let mut at = index + one + one + one;
+        let a0 = index.records(&self.attributes);
+        let a1 = (index + one).records(&self.attributes);
+        let a2 = (index + one + one).records(&self.attributes);
+        let a3 = at.records(&self.attributes);
+        let zero = L::F::zero();
+        let mut areas = [zero; MAX_UV_SETS];
+        areas[0] = doubled_area::<L>([a0[3], a1[3]], [a2[3], a3[0]], [a3[1], a3[2]]);
+        if self.uv_sets > 1 {
+            let flags = a3[3].to_bits();
+            at = at + one + L::U::splat(3).or_else(flags.has(HAS_COLORS), L::U::splat(0));
+            let more = flags.shr(MORE_UV_SETS_SHIFT);
+            for (k, set) in areas.iter_mut().enumerate().take(self.uv_sets).skip(1) {
+                let first = at.records(&self.attributes);
+                let second = (at + one).records(&self.attributes);
+                let area = doubled_area::<L>([first[0], first[1]], [first[2], first[3]], [second[0], second[1]]);
+                *set = area.masked(!more.lt(L::U::splat(k as u32)));
+                at = at + one + one;
+            }
+        }
+        areas
+    }
+
     /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`), of a triangle that is `placed`; the
     /// table must have some.
     #[inline(always)]
@@ -284,6 +312,12 @@ fn interpolate<L: Lanes>(a0: L::F, a1: L::F, a2: L::F, b1: L::F, b2: L::F) -> L:
 #[inline(always)]
 pub fn interpolate3<L: Lanes>(a0: V3<L>, a1: V3<L>, a2: V3<L>, b1: L::F, b2: L::F) -> V3<L> {
     (a2 - a0).mul_add(b2, (a1 - a0).mul_add(b1, a0))
+}
+
+/// Twice the area of a triangle in the plane.
+#[inline(always)]
+fn doubled_area<L: Lanes>(a: [L::F; 2], b: [L::F; 2], c: [L::F; 2]) -> L::F {
+    ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
 }
 
 impl<L: Lanes> Triangle<L> {

@@ -1,24 +1,33 @@
-//! Texture lookups over N lanes: wrap, bilinear or nearest at level 0, decoded to linear before filtering.
+//! Texture lookups over N lanes: wrap, bilinear or nearest, decoded to linear before filtering; at level 0, or between the
+//! two levels of detail that a lane's footprint asks for where the table has levels ([`TextureTable::add_levels`]).
 //!
 //! All texels of a scene lie in one array, so lanes with different textures are read together. An image keeps as many
 //! channels and bits as it has (see [`Texels`]): 1, 2, 4 or 8 bytes a texel, its channels found by shifts per lane. Where
 //! all lanes have the common four bytes, those shifts are the same for all and cost nothing.
 
+use super::mips::{Average, Size, levels, sizes_below};
 use super::{Few, Filter, Image, Texels, Texture, TextureRef, Wrap};
-use crate::math::{UvSets, V3, lanes::lerp};
+use crate::error::RenderError;
+use crate::math::lanes::{lerp, ln};
+use crate::math::{UvSets, V3};
 use simd::{Float, Lanes, Mask, Part, Uint};
 use std::collections::BTreeMap;
 
 /// No texture, in tables.
 pub const NO_TEXTURE: u32 = u32::MAX;
 
+/// A texture, its set of coordinates, the bits of its transform, and what its levels average.
+type BindingKey = (u32, u32, Option<[u32; 6]>, Average);
+
 /// The textures of a scene, ready to be read: each as some material reads it, which is called a binding.
 #[derive(Clone, Debug, Default)]
 pub struct TextureTable {
     /// Per texture of the scene: first word, width, height (as integers' bits), flags.
     textures: Vec<[f32; 4]>,
-    /// The binding of each texture with its set of coordinates and the bits of its transform.
-    bindings: BTreeMap<(u32, u32, Option<[u32; 6]>), u32>,
+    /// The binding of each key.
+    bindings: BTreeMap<BindingKey, u32>,
+    /// Per binding: texture, what its levels average.
+    bound: Vec<(u32, Average)>,
     /// Per binding: the texture's record with the set of coordinates in its flags.
     headers: Vec<[f32; 4]>,
     /// Two per binding: the rows of its transform.
@@ -31,6 +40,11 @@ pub struct TextureTable {
     has_wide: bool,
     /// Texels from the low byte up, rows from the top; an image starts at a word.
     words: Vec<u32>,
+    /// Per binding, if there are levels of detail: its first one (as an integer's bits), its last one's number, texels of
+    /// level 0 per unit area of the coordinates before the transform.
+    chains: Vec<[f32; 4]>,
+    /// First word, width, height (as integers' bits) of levels of detail.
+    levels: Vec<[f32; 4]>,
 }
 
 const WRAP_BITS: u32 = 2;
@@ -107,14 +121,9 @@ impl TextureTable {
     ///
     /// # Errors
     /// More texels than a 32-bit index reaches.
-    pub fn new(textures: &[Texture], images: &[Image]) -> Result<Self, crate::error::RenderError> {
+    pub fn new(textures: &[Texture], images: &[Image]) -> Result<Self, RenderError> {
         let mut table = Self::default();
-        let total: usize = images.iter().map(|i| words_of(&i.texels)).sum();
-        if total >= i32::MAX as usize {
-            let problem = format!("{total} words of texels; at most {}", i32::MAX);
-            return Err(crate::error::RenderError::TooLarge(problem));
-        }
-        table.words.reserve_exact(total);
+        table.reserve(images.iter().map(|i| words_of(&i.texels)).sum())?;
         let placed: Vec<[u32; 2]> = images.iter().map(|i| table.add(&i.texels)).collect();
         let wrap = |w: Wrap| match w {
             Wrap::Repeat => 0,
@@ -128,6 +137,61 @@ impl TextureTable {
             table.textures.push([first, image.width, image.height, flags].map(f32::from_bits));
         }
         Ok(table)
+    }
+
+    /// Makes room for `more` words.
+    fn reserve(&mut self, more: usize) -> Result<(), RenderError> {
+        let total = self.words.len().saturating_add(more);
+        if total >= i32::MAX as usize {
+            return Err(RenderError::TooLarge(format!("{total} words of texels; at most {}", i32::MAX)));
+        }
+        self.words.reserve_exact(more);
+        Ok(())
+    }
+
+    /// Makes the levels of detail of all textures that are bound; `textures` and `images` as given to [`Self::new`]. What is
+    /// bound later has none.
+    ///
+    /// # Errors
+    /// More texels than a 32-bit index reaches.
+    pub fn add_levels(&mut self, textures: &[Texture], images: &[Image]) -> Result<(), RenderError> {
+        let image = |texture: u32| textures[texture as usize].image.index();
+        let mut wanted: Vec<(usize, Average)> = self.bound.iter().map(|&(t, average)| (image(t), average)).collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let below = |i: &Image| sizes_below([i.width as usize, i.height as usize]);
+        let more = |&(i, average): &(usize, Average)| match average {
+            Average::Never => 0,
+            _ => below(&images[i]).iter().map(|[w, h]| words_for(&images[i].texels, w * h)).sum(),
+        };
+        self.reserve(wanted.iter().map(more).sum())?;
+        let mut chains = BTreeMap::new();
+        for (i, average) in wanted {
+            let Image { width, height, texels, .. } = &images[i];
+            let texture = textures.iter().position(|t| t.image.index() == i).expect("bound textures have images");
+            let record = |first: u32, [w, h]: Size| [first, w as u32, h as u32, 0].map(f32::from_bits);
+            let (first, size) = (self.levels.len(), [*width as usize, *height as usize]);
+            self.levels.push(record(self.textures[texture][0].to_bits(), size));
+            let mut sizes = sizes_below(size).into_iter();
+            levels(texels, size, average, |level| {
+                let [at, _] = self.add(&level);
+                self.levels.extend(sizes.next().map(|size| record(at, size)));
+            });
+            chains.insert((i, average), (first as u32, (self.levels.len() - first - 1) as f32));
+        }
+        for (binding, &(texture, average)) in self.bound.iter().enumerate() {
+            let (first, last) = chains[&(image(texture), average)];
+            let Image { width, height, .. } = &images[image(texture)];
+            let [[a, b, ..], [d, e, ..]] = [self.transforms[2 * binding], self.transforms[2 * binding + 1]];
+            let texels = (a * e - b * d).abs() * *width as f32 * *height as f32;
+            self.chains.push([f32::from_bits(first), last, texels, 0.0]);
+        }
+        Ok(())
+    }
+
+    /// Whether there are levels of detail.
+    pub fn has_levels(&self) -> bool {
+        !self.chains.is_empty()
     }
 
     /// Appends texels; where the first one is, and the flags that tell how they are kept.
@@ -161,16 +225,18 @@ impl TextureTable {
         [first, packing]
     }
 
-    /// The binding of `wanted`, the same for the same; [`NO_TEXTURE`] for `None`.
-    pub fn bind(&mut self, wanted: Option<TextureRef>) -> u32 {
+    /// The binding of `wanted`, the same for the same; [`NO_TEXTURE`] for `None`. `average`: what its levels of detail are
+    /// made by, if there will be any.
+    pub fn bind(&mut self, wanted: Option<TextureRef>, average: Average) -> u32 {
         let Some(wanted) = wanted else { return NO_TEXTURE };
         let bits = |m: [[f32; 3]; 2]| [m[0][0], m[0][1], m[0][2], m[1][0], m[1][1], m[1][2]].map(f32::to_bits);
-        let key = (wanted.texture.0, wanted.uv_set, wanted.transform.map(|t| bits(t.m)));
+        let key = (wanted.texture.0, wanted.uv_set, wanted.transform.map(|t| bits(t.m)), average);
         if let Some(&known) = self.bindings.get(&key) {
             return known;
         }
         let id = self.headers.len() as u32;
         self.bindings.insert(key, id);
+        self.bound.push((wanted.texture.0, average));
         let [first, width, height, flags] = self.textures[wanted.texture.index()];
         let flags = f32::from_bits(flags.to_bits() | (wanted.uv_set & UV_SET_MASK) << UV_SET_SHIFT);
         self.headers.push([first, width, height, flags]);
@@ -183,8 +249,16 @@ impl TextureTable {
     /// The coordinates at which binding `id` reads: its set, transformed.
     #[inline(always)]
     pub fn coordinates<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>) -> [L::F; 2] {
-        let flags = id.records(&self.headers)[3].to_bits();
-        let [u, v] = uvs.get(flags.shr(UV_SET_SHIFT));
+        self.place::<L>(id, id.records(&self.headers)[3].to_bits(), uvs)
+    }
+
+    /// [`TextureTable::coordinates`] of a binding whose flags are at hand.
+    #[inline(always)]
+    fn place<L: Lanes>(&self, id: L::U, flags: L::U, uvs: &UvSets<L>) -> [L::F; 2] {
+        let [u, v] = uvs.get(uv_set::<L>(flags));
+        if !self.has_transforms {
+            return [u, v];
+        }
         let row = id.min(L::U::splat(self.headers.len() as u32 - 1)).shl(1);
         let [a, b, c, _] = row.records(&self.transforms);
         let [d, e, f, _] = (row + L::U::splat(1)).records(&self.transforms);
@@ -201,6 +275,9 @@ impl TextureTable {
     /// The binding `id` at the coordinates that it asks for; a lane whose id is [`NO_TEXTURE`] reads anything.
     #[inline(always)]
     pub fn lookup<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {
+        if self.has_levels() && uvs.footprints().is_some() {
+            return L::outline(LevelLookup { textures: self, id, uvs, encoding });
+        }
         L::outline(Lookup { textures: self, id, uvs, encoding })
     }
 
@@ -208,14 +285,19 @@ impl TextureTable {
     fn read<L: Lanes>(&self, id: L::U, uvs: &UvSets<L>, encoding: Encoding) -> Texel<L> {
         let [first, width, height, flags] = id.records(&self.headers);
         let (first, flags) = (first.to_bits(), flags.to_bits());
-        let (width, height) = (width.to_bits(), height.to_bits());
-        let [mut u, mut v] = uvs.get(flags.shr(UV_SET_SHIFT) & L::U::splat(UV_SET_MASK));
-        if self.has_transforms {
-            let row = id.min(L::U::splat(self.headers.len() as u32 - 1)).shl(1);
-            let [a, b, c, _] = row.records(&self.transforms);
-            let [d, e, f, _] = (row + L::U::splat(1)).records(&self.transforms);
-            (u, v) = (a.mul_add(u, b.mul_add(v, c)), d.mul_add(u, e.mul_add(v, f)));
-        }
+        let place = self.place::<L>(id, flags, uvs);
+        self.level::<L>([first, width.to_bits(), height.to_bits()], flags, place, encoding)
+    }
+
+    /// The level that starts at word `first` and has these sides, at the coordinates `u`, `v`.
+    #[inline(always)]
+    fn level<L: Lanes>(
+        &self,
+        [first, width, height]: [L::U; 3],
+        flags: L::U,
+        [u, v]: [L::F; 2],
+        encoding: Encoding,
+    ) -> Texel<L> {
         let nearest = flags.has(NEAREST);
         let across = taps::<L>(u, width.to_float(), flags, nearest);
         let down = taps::<L>(v, height.to_float(), flags.shr(WRAP_BITS), nearest);
@@ -227,6 +309,13 @@ impl TextureTable {
         let unused =
             Packing::<L> { size: L::U::splat(0), at: [L::U::splat(0); 4], mask: L::U::splat(0), scale: L::F::zero() };
         self.filtered::<L, false>(first, width, &across, &down, &unused, encoding)
+    }
+
+    /// Record `number` of the levels of detail.
+    #[inline(always)]
+    fn level_number<L: Lanes>(&self, number: L::U, flags: L::U, place: [L::F; 2], encoding: Encoding) -> Texel<L> {
+        let [first, width, height, _] = number.records(&self.levels);
+        self.level::<L>([first.to_bits(), width.to_bits(), height.to_bits()], flags, place, encoding)
     }
 
     #[inline(always)]
@@ -312,6 +401,50 @@ impl<L: Lanes> Part<L> for Lookup<'_, L> {
     }
 }
 
+/// [`TextureTable::lookup`] between levels of detail.
+struct LevelLookup<'a, L: Lanes> {
+    textures: &'a TextureTable,
+    id: L::U,
+    uvs: &'a UvSets<L>,
+    encoding: Encoding,
+}
+
+/// 1 / (2 ln 2): of the natural logarithm of an area in texels, the binary one of its width.
+const HALF_LOG2_E: f32 = 0.5 * std::f32::consts::LOG2_E;
+
+impl<L: Lanes> Part<L> for LevelLookup<'_, L> {
+    type Output = Texel<L>;
+
+    #[inline(always)]
+    fn run(self) -> Texel<L> {
+        let Self { textures, id, uvs, encoding } = self;
+        let (zero, one) = (L::F::zero(), L::F::one());
+        let flags = id.records(&textures.headers)[3].to_bits();
+        let [first, last, texels, _] = id.records(&textures.chains);
+        let place = textures.place::<L>(id, flags, uvs);
+        let area: L::F = uvs.footprint(uv_set::<L>(flags)) * texels;
+        // The level whose texels are as wide as the footprint, after Akenine-Moller et al. 2019, equation 34; 0 for NaN.
+        let wanted: L::F =
+            (ln::<L>(area.max(zero).min(L::F::splat(f32::MAX))) * L::F::splat(HALF_LOG2_E)).max(zero).min(last);
+        let fine = wanted.floor();
+        let weight = wanted - fine;
+        let texel = textures.level_number::<L>(first.to_bits() + fine.to_uint(), flags, place, encoding);
+        if !weight.gt(zero).any() {
+            return texel;
+        }
+        let coarse = first.to_bits() + (fine + one).min(last).to_uint();
+        let coarse = textures.level_number::<L>(coarse, flags, place, encoding);
+        // Exactly the finer one where the weight is 0, so that a lane does not depend on its neighbours.
+        Texel { rgb: texel.rgb.lerp(coarse.rgb, weight), a: lerp(texel.a, coarse.a, weight) }
+    }
+}
+
+/// The set of coordinates in the flags of a binding.
+#[inline(always)]
+fn uv_set<L: Lanes>(flags: L::U) -> L::U {
+    flags.shr(UV_SET_SHIFT) & L::U::splat(UV_SET_MASK)
+}
+
 /// The channel that starts at bit `at` of a texel of one or two words.
 #[inline(always)]
 fn channel<L: Lanes>(low: L::U, high: L::U, at: L::U, packing: &Packing<L>) -> L::F {
@@ -325,11 +458,16 @@ fn word16(pair: [u16; 2]) -> u32 {
 
 /// Words that an image takes.
 fn words_of(texels: &Texels) -> usize {
-    match texels {
-        Texels::Rgba8(t) => t.len(),
-        Texels::Rgba16(t) => 2 * t.len(),
-        Texels::Few8(few) => few.values.len().div_ceil(4),
-        Texels::Few16(few) => few.values.len().div_ceil(2),
+    words_for(texels, texels.len())
+}
+
+/// Words that `n` texels take that are kept as `like`.
+fn words_for(like: &Texels, n: usize) -> usize {
+    match like {
+        Texels::Rgba8(_) => n,
+        Texels::Rgba16(_) => 2 * n,
+        Texels::Few8(few) => (few.kept * n).div_ceil(4),
+        Texels::Few16(few) => (few.kept * n).div_ceil(2),
     }
 }
 

@@ -33,7 +33,7 @@ fn table(wrap: Wrap, filter: Filter) -> TextureTable {
 }
 
 fn bound(mut table: TextureTable) -> TextureTable {
-    table.bind(Some(TextureRef::plain(TextureId(0))));
+    table.bind(Some(TextureRef::plain(TextureId(0))), Average::Never);
     table
 }
 
@@ -190,7 +190,7 @@ fn images_of_every_width_are_read_side_by_side() {
         (0..images.len()).map(|i| Texture { image: ImageId(i as u32), ..NEAREST_TEXEL }).collect();
     let mut table = TextureTable::new(&textures, &images).unwrap();
     for i in 0..textures.len() {
-        assert_eq!(table.bind(Some(TextureRef::plain(TextureId(i as u32)))), i as u32);
+        assert_eq!(table.bind(Some(TextureRef::plain(TextureId(i as u32))), Average::Never), i as u32);
     }
     for x in 0..5 {
         let uv = [(x as f32 + 0.5) / 5.0, 0.5];
@@ -233,9 +233,9 @@ fn each_binding_has_its_own_set_of_coordinates_and_transform() {
         TextureRef { transform: Some(swapped), ..second },
     ];
     for (i, w) in wanted.iter().enumerate() {
-        assert_eq!(table.bind(Some(*w)), i as u32);
+        assert_eq!(table.bind(Some(*w), Average::Never), i as u32);
     }
-    assert_eq!(table.bind(Some(second)), 1, "bound once");
+    assert_eq!(table.bind(Some(second), Average::Never), 1, "bound once");
     // Set 0 falls into texel (0, 1), set 1 into texel (3, 0).
     let got = read_mixed(&table, 4, [[0.1, 0.4], [0.9, 0.2]]);
     let texel = |g: [f32; 4]| [g[0], g[1]].map(|v| (v * 25.5).round());

@@ -1,6 +1,7 @@
 //! Image textures as described by the file. Lookups over N lanes are in [`lookup`].
 
 pub mod lookup;
+pub mod mips;
 mod texels;
 
 use crate::id::{ImageId, TextureId};
@@ -48,7 +49,7 @@ pub struct Texture {
     pub wrap_u: Wrap,
     /// Down.
     pub wrap_v: Wrap,
-    /// Magnification filter; textures are always read at level 0.
+    /// Magnification filter, which the levels of detail have as well (`--texture-lod`).
     pub filter: Filter,
 }
 

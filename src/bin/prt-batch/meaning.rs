@@ -119,6 +119,7 @@ pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
         filter: args.filter,
         brdf: args.brdf,
         cull_backfaces: args.cull_backfaces,
+        texture_lod: args.texture_lod,
         default_light: args.default_light,
         accel: args.accel,
         embree_dirs: embree_dirs(),

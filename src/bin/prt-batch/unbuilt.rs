@@ -40,7 +40,6 @@ const OPTIONS: &[Unbuilt] = &[
         "C",
         "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
     ),
-    option("Sampling", "texture-lod", "", "Ray-cone level of detail (biased)"),
     option(
         "Lens",
         "f-stop",

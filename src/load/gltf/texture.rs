@@ -88,7 +88,8 @@ fn source(loader: &mut Loader, texture: &gltf::json::Texture, at: &str) -> Resul
     Ok(None)
 }
 
-/// Wrapping and magnification; textures are always read at level 0, so the minification filter does not matter.
+/// Wrapping and magnification; level 0 is read alone or, by `--texture-lod`, the levels to
+/// either side, so the minification filter does not matter.
 fn sampler(loader: &Loader, index: Index<Sampler>, pointer: &str) -> Result<(Wrap, Wrap, Filter)> {
     let doc = loader.doc;
     let sampler = doc.item(&doc.root.samplers, index, pointer, "samplers")?;

@@ -8,6 +8,7 @@ use crate::material::surface::{DisneyExtras, Extras};
 use crate::math::lanes::lerp;
 use crate::math::{UvSets, V3};
 use crate::texture::lookup::{Encoding, TextureTable};
+use crate::texture::mips::Average;
 use simd::{Float, Lanes, Mask, Uint};
 
 const RECORDS: u32 = 11;
@@ -68,7 +69,8 @@ impl ExtrasTable {
         }
         self.flags |= flags;
         let place = self.records.len() as u32 / RECORDS;
-        let mut id = |t| f32::from_bits(textures.bind(t));
+        let mut id = |t, average| f32::from_bits(textures.bind(t, average));
+        let (values, light) = (Average::Values, Average::Light);
         let [sheen_r, sheen_g, sheen_b] = m.sheen.color.factor;
         let (sin, cos) = f64::from(m.anisotropy.rotation).sin_cos();
         let [through_r, through_g, through_b] = m.diffuse_transmission.color.factor;
@@ -80,28 +82,28 @@ impl ExtrasTable {
             [
                 m.clearcoat.factor.factor,
                 m.clearcoat.roughness.factor,
-                id(m.clearcoat.factor.texture),
-                id(m.clearcoat.roughness.texture),
+                id(m.clearcoat.factor.texture, values),
+                id(m.clearcoat.roughness.texture, values),
             ],
             [
-                id(m.clearcoat.normal.texture),
+                id(m.clearcoat.normal.texture, values),
                 m.clearcoat.normal.factor,
-                id(m.sheen.color.texture),
-                id(m.sheen.roughness.texture),
+                id(m.sheen.color.texture, light),
+                id(m.sheen.roughness.texture, values),
             ],
             [sheen_r, sheen_g, sheen_b, m.sheen.roughness.factor],
-            [m.anisotropy.strength.factor, cos as f32, sin as f32, id(m.anisotropy.strength.texture)],
+            [m.anisotropy.strength.factor, cos as f32, sin as f32, id(m.anisotropy.strength.texture, values)],
             [film.factor.factor, film.ior, film.thickness_minimum, film.thickness_maximum.factor],
             [
-                id(film.factor.texture),
-                id(film.thickness_maximum.texture),
+                id(film.factor.texture, values),
+                id(film.thickness_maximum.texture, values),
                 m.transmission.factor.factor,
-                id(m.transmission.factor.texture),
+                id(m.transmission.factor.texture, values),
             ],
             [
                 m.diffuse_transmission.factor.factor,
-                id(m.diffuse_transmission.factor.texture),
-                id(m.diffuse_transmission.color.texture),
+                id(m.diffuse_transmission.factor.texture, values),
+                id(m.diffuse_transmission.color.texture, light),
                 dispersion,
             ],
             [through_r, through_g, through_b, 0.0],
@@ -354,7 +356,8 @@ impl MaterialTable {
             return one;
         }
         let [mut coat, _, texture, _] = self.extras.record::<L>(place, 0);
-        if let Some((t, has)) = texel::<L>(textures, texture, uvs, lanes, Encoding::Linear) {
+        // At level 0, as emission: light sampling knows no footprint.
+        if let Some((t, has)) = texel::<L>(textures, texture, &uvs.sharp(), lanes, Encoding::Linear) {
             coat = (coat * t.rgb.x).or_else(has, coat);
         }
         (one - coat * dielectric::<L>(cos, L::F::splat(COAT_IOR))).or_else(lanes, one)

@@ -8,6 +8,7 @@ use super::{AlphaMode, Material};
 use crate::math::{UvSets, V3};
 use crate::texture::TextureRef;
 use crate::texture::lookup::{Encoding, NO_TEXTURE, Texel, TextureTable};
+use crate::texture::mips::Average;
 use extras::ExtrasTable;
 use simd::{Float, Lanes, Mask, Uint};
 
@@ -98,7 +99,11 @@ impl MaterialTable {
         let is_glossy = m.specular_glossiness && !m.unlit;
         let (place, extras) = self.extras.push(m, textures);
         let flags = flags | if is_glossy { GLOSSY } else { 0 } | extras << EXTRAS_SHIFT;
-        let mut id = |t| f32::from_bits(textures.bind(t));
+        let mut id = |t, average| f32::from_bits(textures.bind(t, average));
+        let (values, light) = (Average::Values, Average::Light);
+        // The colour of a surface is that of the part of it that is there.
+        let is_cut_out = alpha != 0 && m.opacity.texture == m.base_color.texture;
+        let base = if is_cut_out { Average::LightByOpacity } else { light };
         let ([r, g, b], [er, eg, eb]) = (m.base_color.factor, m.emission.factor);
         // KHR_materials_ior: ior 0 stands for infinite, which reflects everything.
         let ior = if m.ior > LARGEST_IOR { 0.0 } else { m.ior };
@@ -111,10 +116,22 @@ impl MaterialTable {
             [r, g, b, f32::from_bits(flags)],
             [m.metallic.factor, m.roughness.factor, m.specular.factor, m.normal.factor],
             [f0[0], f0[1], f0[2], m.opacity.factor],
-            [er, eg, eb, id(m.emission.texture)],
-            [id(m.base_color.texture), id(m.roughness.texture), id(m.normal.texture), id(m.specular.texture)],
-            [id(m.specular_color.texture), id(metallic), id(m.opacity.texture), id(bump)],
-            [cutoff, m.bump.factor, id(plain_bump), 0.0],
+            // Emission is sampled as light, opacity decides for shadow rays as well, slopes are differences of texels: all
+            // of these at level 0.
+            [er, eg, eb, id(m.emission.texture, Average::Never)],
+            [
+                id(m.base_color.texture, base),
+                id(m.roughness.texture, values),
+                id(m.normal.texture, values),
+                id(m.specular.texture, values),
+            ],
+            [
+                id(m.specular_color.texture, light),
+                id(metallic, values),
+                id(m.opacity.texture, Average::Never),
+                id(bump, Average::Never),
+            ],
+            [cutoff, m.bump.factor, id(plain_bump, Average::Never), 0.0],
             [f32::from_bits(place), ior, f32::from_bits(self.energy.class(ior)), 0.0],
         ]);
         let textures = [
@@ -202,7 +219,8 @@ impl MaterialTable {
         let texture = self.record::<L>(material, 5)[2].to_bits();
         let has = (masks | blends) & !texture.eq(L::U::splat(NO_TEXTURE));
         if has.any() {
-            opacity = (opacity * textures.lookup::<L>(texture, uvs, Encoding::Linear).a).or_else(has, opacity);
+            let texel = textures.lookup::<L>(texture, &uvs.sharp(), Encoding::Linear);
+            opacity = (opacity * texel.a).or_else(has, opacity);
         }
         let cutoff = self.record::<L>(material, 6)[0];
         let there = one.or_else(opacity.ge(cutoff), zero);
@@ -236,7 +254,7 @@ impl MaterialTable {
         if !textured.any() {
             return factor;
         }
-        let texel = textures.lookup::<L>(texture, uvs, Encoding::Srgb);
+        let texel = textures.lookup::<L>(texture, &uvs.sharp(), Encoding::Srgb);
         (factor * texel.rgb).or_else(textured, factor)
     }
 

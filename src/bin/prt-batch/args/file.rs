@@ -129,6 +129,12 @@ pub struct FileArgs {
     /// auto: Embree if its library is found, else bvh, and it says which. linear: brute force, for tests.
     #[arg(long, value_name = "NAME", default_value = "auto", value_parser = parse::accel(), help_heading = SAMPLING)]
     pub accel: AccelChoice,
+    /// Ray-cone level of detail (biased)
+    ///
+    /// Textures are averaged over what a pixel, or a scattered ray, sees of them: less noise at few samples, softer
+    /// textures at any number. Emission and opacity are not.
+    #[arg(long, help_heading = SAMPLING)]
+    pub texture_lod: bool,
 
     /// Built-in studio light
     ///
