@@ -237,7 +237,7 @@ fn files_that_are_not_of_the_scene_do_not_matter() {
 type Edit = fn(&mut Shot);
 
 /// What matters of both formats, by the option that is named then.
-const MATTERS: [(&str, Edit); 18] = [
+const MATTERS: [(&str, Edit); 19] = [
     ("size 64 wide -> 65 wide", |s| s.settings.size = PictureSize::Width(65)),
     ("size 64 wide -> 64x36", |s| s.settings.size = PictureSize::Exact(64, 36)),
     ("camera 0 -> 1", |s| s.camera = 1),
