@@ -38,6 +38,8 @@ fn the_same_seed_gives_the_same_json_for_any_number_of_threads() {
     assert_eq!(found, run("7", "2"));
     assert_ne!(found["subjects"], run("8", "1")["subjects"]);
     assert_eq!((&found["passed"], &found["seed"], &found["rays"]), (&true.into(), &7.into(), &(60 * 14).into()));
+    // Scenes of users are held to the limit of disagreements too: four kinds of rays count for it.
+    assert_eq!((&found["subjects"][0]["ordinary"], &found["usual_rays"]), (&true.into(), &(60 * 4).into()));
     let kind = &found["subjects"][0]["kinds"][0];
     assert_eq!((&kind["kind"], &kind["rays"], &kind["disagreements"]), (&"camera".into(), &60.into(), &0.into()));
     let tally = &kind["contenders"][0];

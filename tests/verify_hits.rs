@@ -117,6 +117,30 @@ fn every_flaw_is_found_and_named() {
 }
 
 #[test]
+fn backends_that_disagree_at_an_ordinary_subject_fail_by_name_and_at_others_do_not() {
+    let subject = |is_ordinary| Subject { is_ordinary, ..entry("bumpy").subject() };
+    // Called Embree's, so that misses alone do not fail it: of 800 usual rays it loses every ninth.
+    let disagreements = |subject: &Subject| {
+        let bvh = |flaw| Arc::new(Flawed(WideBvh::build(subject.geometry.clone()), flaw));
+        let contenders = [
+            Contender::new("bvh", Backend::Bvh, bvh(Flaw::None)),
+            Contender::new("embree", Backend::Embree, bvh(Flaw::LosesHits)),
+        ];
+        let report = Report::new(0, vec![hits_of("bumpy", subject, &contenders, &settings(200))]);
+        let found = report.problems.into_iter().find(|problem| problem.contains("disagree about hit or miss"));
+        (report.usual_rays, report.usual_hit_or_miss, found)
+    };
+    let (rays, hit_or_miss, found) = disagreements(&subject(true));
+    let found = found.expect("a problem");
+    assert!(rays == 800 && hit_or_miss > 20, "{rays} {hit_or_miss}");
+    // None of them is a tie or a boundary.
+    let told =
+        format!("of {hit_or_miss} of 800 usual rays; allowed: 1 (bumpy: {hit_or_miss}, unexplained {hit_or_miss})");
+    assert!(found.contains(&told), "{found} for {told}");
+    assert_eq!(disagreements(&subject(false)), (0, 0, None));
+}
+
+#[test]
 fn a_backend_that_lacks_one_triangle_misses_it_and_sees_what_is_behind() {
     let report = judged("bumpy", |mut geometry| {
         // In place of the last one, so that the others keep their numbers.

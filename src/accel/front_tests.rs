@@ -14,6 +14,24 @@ fn scenes_too_large_for_a_second_tree_have_no_front() {
 }
 
 #[test]
+fn geo06_scenes_that_reach_farther_than_1e12_m_or_nowhere_have_no_front() {
+    // A wall and a hundred small triangles, the farthest corner at `reach`.
+    let has_front = |reach: f32| {
+        let wall = [[-1.0, -1.0, 0.5], [1.0, -1.0, 0.5], [0.0, 1.0, 0.5]];
+        let small = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0]];
+        let positions = wall.into_iter().chain(small).map(|p: [f32; 3]| p.map(|x| x * reach)).collect();
+        let indices = [[0, 1, 2]].into_iter().chain([[3, 4, 5]; 100]).collect();
+        Split::new(Triangles { positions, indices }).front.is_some()
+    };
+    for near in [1e-12, 1.0, 1e12] {
+        assert!(has_front(near), "{near:e} m");
+    }
+    for far in [1e12_f32.next_up(), 1e13, 1e18, f32::MAX, f32::INFINITY, f32::NAN] {
+        assert!(!has_front(far), "{far:e} m");
+    }
+}
+
+#[test]
 fn bvh02_rays_along_a_face_of_the_box_of_the_rest_go_on() {
     let quad = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 2.0], [-1.0, 1.0, 2.0]];
     let wall = [[-50.0, -50.0, 9.0], [50.0, -50.0, 9.0], [0.0, 50.0, 9.0]];

@@ -8,12 +8,14 @@ use super::tracer::window;
 use super::{AccelChoice, DefaultLight, RenderSettings};
 use crate::accel::front::{MOST, MOST_TWICE};
 use crate::accel::geometry::{Affine, Placement};
+use crate::accel::wide::{MOST_SPLITS, may_split};
 use crate::film::BLOCKS;
 use crate::light::{studio, table::PreparedLight};
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
 use crate::shape::placement::PlacementTable;
 use crate::texture::Texels;
+use glam::Vec3;
 use serde::Serialize;
 use std::sync::OnceLock;
 
@@ -213,7 +215,12 @@ impl Machinery {
         };
         let geometry = 12 * (vertices + triangles);
         let placements = placing.placements() as u64;
-        let accel = accel(vertices, triangles, placements, settings.accel);
+        let most_splits = if settings.accel == AccelChoice::Bvh && may_split(merged_triangles(scene, &placing)) {
+            (triangles as f64 * MOST_SPLITS) as u64
+        } else {
+            0
+        };
+        let accel = accel(vertices, [triangles, most_splits], placements, settings.accel);
         let list = lights * (size_of::<(PreparedLight, f64)>() as u64 + 8);
         Self {
             held: records + texels + levels.held + environment + lights * LIGHT + placements * PLACEMENT + accel.held,
@@ -248,6 +255,17 @@ impl Levels {
     }
 }
 
+/// The corners of what is merged into the world, metres.
+fn merged_triangles<'a>(scene: &'a Scene, placing: &'a Placing) -> impl Iterator<Item = [Vec3; 3]> + 'a {
+    let merged = scene.instances.iter().zip(&placing.is_merged).filter(|(_, is_merged)| **is_merged);
+    merged.flat_map(|(instance, _)| {
+        let (mesh, place) = (&scene.meshes[instance.mesh.index()], instance.world_from_object);
+        let corner =
+            move |v: u32| place.transform_point3(Vec3::from_array(mesh.positions[v as usize]).as_dvec3()).as_vec3();
+        mesh.indices.iter().map(move |triangle| triangle.map(corner))
+    })
+}
+
 /// What the triangle table holds a triangle of `mesh`.
 fn bytes_per_triangle(mesh: &Mesh) -> u64 {
     let has_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
@@ -265,17 +283,19 @@ struct AccelBytes {
     building: u64,
 }
 
-fn accel(vertices: u64, triangles: u64, placements: u64, choice: AccelChoice) -> AccelBytes {
+/// Of triangles, and of spatial splits of `bvh` beyond them at most.
+fn accel(vertices: u64, [triangles, splits]: [u64; 2], placements: u64, choice: AccelChoice) -> AccelBytes {
     // With a front there are two trees; whether there is one shows only when the scene is prepared.
     let trees = if triangles + placements <= MOST_TWICE as u64 && choice != AccelChoice::Linear { 2 } else { 1 };
     let (vertices, triangles, placements) = (trees * vertices, trees * triangles, trees * placements);
+    let references = triangles + trees * splits;
     let geometry = 12 * (vertices + triangles);
     match choice {
         // It keeps the placements as they were handed to it.
         AccelChoice::Linear => AccelBytes { held: geometry, building: 0 },
         AccelChoice::Bvh => AccelBytes {
-            held: BVH.held * triangles + BVH_PLACEMENT.held * placements,
-            building: BVH.building * triangles + BVH_PLACEMENT.building * placements,
+            held: BVH.held * references + BVH_PLACEMENT.held * placements,
+            building: BVH.building * references + BVH_PLACEMENT.building * placements,
         },
         AccelChoice::Auto | AccelChoice::Embree => AccelBytes {
             held: geometry + EMBREE.held * triangles + EMBREE_PLACEMENT.held * placements,
@@ -286,7 +306,8 @@ fn accel(vertices: u64, triangles: u64, placements: u64, choice: AccelChoice) ->
 
 /// Bytes a triangle of `accel::wide`: 40 in leaves and about 10 in nodes; while it is built a reference of 32, about one
 /// binary node of 64, and 10 for the nodes once more. Measured: 50 and 90 to 112 on a terrain, a cave, a room and a soup.
-/// Where spatial splits are taken, which the triangles' number does not tell, it is up to half more.
+/// Spatial splits count like triangles: where the triangles' boxes call for a trial of them, all that there may be are
+/// counted. (Not those of placed objects, which are small, nor where `auto` falls back to `bvh`.)
 const BVH: AccelBytes = AccelBytes { held: 52, building: 32 + 64 + 10 };
 /// Bytes a triangle of Embree 4.4 (ROBUST, medium quality): 92 at most, measured on grids and a cave; the arrays that it
 /// reads are counted beside.

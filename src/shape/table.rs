@@ -355,3 +355,7 @@ impl<L: Lanes> Triangle<L> {
         (triangle, placed.point(p), offset.or_else(placed.lanes, self.offset_length()))
     }
 }
+
+#[cfg(test)]
+#[path = "table_tests.rs"]
+mod tests;

@@ -31,7 +31,7 @@ pub struct Subject {
     pub geometry: Geometry,
     /// Where rays that start inside of a closed mesh do so; `None` if it is not closed, or not known to be.
     pub inside: Option<Inside>,
-    /// Backends may disagree about hit or miss of 2 in a million usual rays. Not so where Embree catches rays that leave
+    /// Backends may disagree about hit or miss of 2 in a million usual rays, here as at scenes of users. Not so where Embree catches rays that leave
     /// slivers (`slivers`, `needles`: 1 to 10 of 100), where the scene is so much larger than a triangle that the error
     /// bound is as large (`mixed-scales`: 40 of a million) and where triangles are 2 ulp of their coordinates (`sphere-far`).
     pub is_ordinary: bool,

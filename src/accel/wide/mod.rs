@@ -36,7 +36,7 @@ use node::{Child, Leaves, Node, WIDTH};
 use simd::Level;
 use source::Source;
 use special::{Placed, Special};
-pub use split::SpatialSplits;
+pub use split::{MOST_SPLITS, SpatialSplits, may_split};
 use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Arc;

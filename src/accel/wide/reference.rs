@@ -68,7 +68,12 @@ impl Reference {
     /// distance is the ray's, see `ray.rs`). [`Reference::NOTHING`] for a triangle of no area.
     #[inline(always)]
     pub fn of_triangle(triangles: &Source<'_>, i: usize) -> Self {
-        let [a, b, c] = triangles.corners(i);
+        Self::of_corners(triangles.corners(i), i)
+    }
+
+    /// The same for triangle `i` of these corners.
+    #[inline(always)]
+    pub fn of_corners([a, b, c]: [Vec3; 3], i: usize) -> Self {
         if !can_be_hit([a, b, c]) {
             return Self::NOTHING;
         }

@@ -61,11 +61,19 @@ pub struct Survey {
 }
 
 impl Survey {
+    const NOTHING: Self = Self { bounds: Bounds::EMPTY, emptiness: 0.0, is_complete: true };
+
+    /// Whether boxes are so empty that a trial is made. NaN and infinite areas: no.
+    fn calls_for_a_trial(&self) -> bool {
+        let is_empty = self.emptiness >= EMPTY_BOXES * f64::from(self.bounds.half_area());
+        is_empty && self.emptiness.is_finite()
+    }
+
     /// Of `references`, whatever the number of threads.
     pub fn of(references: &[Reference], level: Level) -> Self {
         let parts: Vec<Self> =
             references.par_chunks(CHUNK).map(|references| dispatch(level, Look { references })).collect();
-        let mut all = Self { bounds: Bounds::EMPTY, emptiness: 0.0, is_complete: true };
+        let mut all = Self::NOTHING;
         for part in parts {
             all.bounds = Bounds(std::array::from_fn(|i| all.bounds.0[i].min(part.bounds.0[i])));
             all.emptiness += part.emptiness;
@@ -84,7 +92,7 @@ impl Kernel for Look<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Survey {
-        let mut all = Survey { bounds: Bounds::EMPTY, emptiness: 0.0, is_complete: true };
+        let mut all = Survey::NOTHING;
         for r in self.references {
             all.bounds = all.bounds.union::<L>(&r.0);
             all.is_complete &= r.is_something();
@@ -94,12 +102,27 @@ impl Kernel for Look<'_> {
     }
 }
 
+/// Whether a tree over triangles of these corners, metres, may have spatial splits: for estimates of its memory. What is
+/// asked here is asked first by the build, which then makes a trial.
+pub fn may_split(triangles: impl Iterator<Item = [Vec3; 3]>) -> bool {
+    let mut all = Survey::NOTHING;
+    for corners in triangles {
+        let r = Reference::of_corners(corners, 0);
+        if r.is_something() {
+            all.bounds = Bounds(std::array::from_fn(|i| all.bounds.0[i].min(r.0.0[i])));
+            all.emptiness += f64::from(r.emptiness());
+        }
+    }
+    all.calls_for_a_trial()
+}
+
+/// Parts beyond one a triangle at most, as a share of the triangles.
+pub const MOST_SPLITS: f64 = BUDGET;
+
 /// Whether splitting `references`, none of which stands for nothing, pays: a matter of their boxes and, if these are
 /// empty enough, of the SAH costs of trees over a sample of them.
 pub fn pays(triangles: &Source<'_>, references: &[Reference], survey: &Survey) -> bool {
-    // NaN and infinite areas: no.
-    let is_empty = survey.emptiness >= EMPTY_BOXES * f64::from(survey.bounds.half_area());
-    if !is_empty || !survey.emptiness.is_finite() {
+    if !survey.calls_for_a_trial() {
         return false;
     }
     // Multiples of the golden ratio: evenly spread, and in step with no pattern of a mesh.

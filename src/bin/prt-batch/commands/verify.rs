@@ -126,7 +126,6 @@ fn scene(path: &Path, settings: &Settings) -> Result<SubjectReport, String> {
     let (scene, _) = load(path, &LoadOptions::default()).map_err(|error| error.to_string())?;
     let named = |error: prt::error::RenderError| format!("{}: {error}", path.display());
     let geometry = geometry(&scene, &RenderSettings::default()).map_err(named)?;
-    // Whether its triangles are larger than the error bound is not known.
-    let subject = Subject { geometry, inside: None, is_ordinary: false };
+    let subject = Subject { geometry, inside: None, is_ordinary: true };
     hits(&path.display().to_string(), &subject, settings).map_err(named)
 }
