@@ -163,6 +163,17 @@ fn bsdf_05_white_stretched_highlights_are_white_from_every_azimuth() {
 }
 
 #[test]
+fn bsdf_05_rough_white_boundaries_of_index_0_are_white() {
+    for (roughness, cosine, transmission) in [(1.0, 1.0, 1.0), (1.0, 0.5, 0.5), (0.5, 0.9, 1.0)] {
+        let cell = Cell { ior: 1, is_volume: true, roughness, cosine, transmission, ..plain() };
+        let (energy, surface) = (energy(Brdf::Full), cell.surface());
+        let found = prt::verify::bsdf::checks::furnace(&cell.side(&surface, &energy), cell.view(), 96, 1);
+        let noise = 3.0 * found.deviation[0] / 96.0;
+        assert!((found.albedo[0] - 1.0).abs() < WHITE + noise, "{cell} at {cosine}: {found:?}");
+    }
+}
+
+#[test]
 fn bsdf_13_black_surfaces_without_specular_reflection_give_nothing_and_no_number_that_is_none() {
     let cell = Cell { ior: 2, is_white: true, ..plain() };
     let mut surface = cell.surface();

@@ -339,7 +339,9 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let gained = kept + boundary.scale(through.share * through.gain).masked(!through.is_none);
         let all = V3::<L>::splat([1.0; 3]);
         let mut taken = all.scale(boundary.max_component());
-        if let Some(film) = &self.film {
+        if self.is_full
+            && let Some(film) = &self.film
+        {
             taken = taken.or_else(through.is_volume, film.taken(boundary, boundary));
         }
         let passes = all.or_else(through.is_none, all - taken);
