@@ -540,7 +540,7 @@ fn lane_does_not_depend_on_its_neighbours() {
             if !alone.has_extras {
                 assert_eq!((values.coat, values.transmission[0], values.is_volume), ([0.0; 2], 0.0, false));
                 (values.anisotropy, values.iridescence) = ([0.0; 3], [0.0; 3]);
-                (values.transmission, values.diffuse_transmission) = ([0.0; 3], [0.0; 4]);
+                (values.transmission, values.diffuse_transmission) = ([0.0; 2], [0.0; 4]);
             }
             (values.has_extras, alone.has_extras) = (true, true);
             assert_eq!(values, alone, "material {i}");
