@@ -93,6 +93,8 @@ if [ -n "$long" ]; then
   target/release/prt-batch verify hits --rays 100000
   target/release/prt-batch verify hits scenes/ --rays 100000
   summary+=("verify hits: passed")
+  # The tables are what their generator makes, to the bit.
+  cargo run --locked --quiet --release --example energy_tables -- --check
   # BSDF-01 to -05, -10.
   target/release/prt-batch verify materials --samples 1000000 --random 2000 --seed "$(date +%j)"
   summary+=("verify materials: passed")

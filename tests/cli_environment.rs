@@ -66,7 +66,7 @@ fn it_is_seen_turned_and_scaled_and_the_studio_is_off() {
     let turned = ["--env", "sky.hdr", "--env-rotate", "-270", "--env-scale", "0.5"];
     all_are(&rendered(root.path(), &turned).0, 4.0);
     let meta = exr::meta::MetaData::read_from_file(root.path().join("renders/a.exr"), false).unwrap();
-    let light = meta.headers[0].own_attributes.other.iter().find(|(name, _)| name.to_string() == "prt:light");
+    let light = meta.headers[0].own_attributes.other.iter().find(|(name, _)| *name == "prt:light");
     assert!(format!("{light:?}").contains("environment"), "{light:?}");
 }
 

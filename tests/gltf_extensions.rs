@@ -5,6 +5,7 @@ mod gltf_support;
 
 use gltf_support::{Sample, base64, png};
 use prt::material::extensions::Disney;
+use prt::material::media::{LINES, MediumTable};
 use prt::material::table::MaterialTable;
 use prt::material::{AlphaMode, Material};
 use prt::math::UvSets;
@@ -74,12 +75,11 @@ struct Values {
     anisotropy: [f32; 3],
     /// Factor, index, thickness.
     iridescence: [f32; 3],
-    /// Factor, index, dispersion.
-    transmission: [f32; 3],
+    /// Factor, index.
+    transmission: [f32; 2],
     is_volume: bool,
     diffuse_transmission: [f32; 4],
     disney: Option<[f32; 8]>,
-    absorption: [f32; 3],
 }
 
 /// Reads materials, one a lane from the first on, the last one in the lanes behind.
@@ -104,7 +104,6 @@ impl Kernel for Probe<'_> {
         uvs.set(1, L::F::splat(0.75), half);
         let s = self.table.rich_surface::<L>(self.textures, material, &uvs, all);
         let (coat_normal, has_coat_normal) = self.table.clearcoat_normal_map::<L>(self.textures, material, &uvs, all);
-        let absorption = self.table.volume::<L>(material, all);
         let mut lanes = Vec::new();
         for i in 0..L::N.min(self.materials.len()) {
             let get = |v: L::F| {
@@ -119,7 +118,6 @@ impl Kernel for Probe<'_> {
                 metallic: get(s.metallic),
                 roughness: get(s.roughness),
                 coat_normal: is(has_coat_normal).then(|| [get(coat_normal.x), get(coat_normal.y), get(coat_normal.z)]),
-                absorption: [get(absorption.x), get(absorption.y), get(absorption.z)],
                 ..Values::default()
             };
             if let Some(e) = &s.extras {
@@ -128,7 +126,7 @@ impl Kernel for Probe<'_> {
                 values.sheen = [get(e.sheen.x), get(e.sheen.y), get(e.sheen.z), get(e.sheen_roughness)];
                 values.anisotropy = [get(e.anisotropy), get(e.anisotropy_direction[0]), get(e.anisotropy_direction[1])];
                 values.iridescence = [get(e.iridescence), get(e.iridescence_ior), get(e.iridescence_thickness)];
-                values.transmission = [get(e.transmission), get(s.ior), get(e.dispersion)];
+                values.transmission = [get(e.transmission), get(s.ior)];
                 values.is_volume = is(e.is_volume);
                 let c = &e.diffuse_transmission_color;
                 values.diffuse_transmission = [get(e.diffuse_transmission), get(c.x), get(c.y), get(c.z)];
@@ -151,6 +149,21 @@ impl Kernel for Probe<'_> {
     }
 }
 
+/// What is left after a metre inside of the first material, per colour, the index there, and those of the lines F and C.
+struct Inside<'a>(&'a MediumTable);
+
+impl Kernel for Inside<'_> {
+    type Output = [f32; 6];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> [f32; 6] {
+        let inside = MediumTable::inside::<L>(L::U::splat(0));
+        let left = self.0.transmittance::<L>(inside, L::F::one());
+        let [f, _, c] = LINES.map(|line| self.0.ior_at::<L>(inside, L::F::splat(line as f32)));
+        [left.x, left.y, left.z, self.0.ior::<L>(inside), f, c].map(|v| v.first())
+    }
+}
+
 fn tables(scene: &Scene) -> (MaterialTable, TextureTable) {
     let mut textures = TextureTable::new(&scene.textures, &scene.images).unwrap();
     (MaterialTable::new(&scene.materials, &mut textures, prt::render::Brdf::Full), textures)
@@ -162,7 +175,6 @@ fn read(scene: &Scene) -> Values {
     let materials = [scene.meshes[0].material.0];
     let probe = Probe { table: &table, textures: &textures, materials: &materials };
     let values = dispatch(Level::Scalar, probe.clone()).remove(0);
-    assert_eq!(table.volume_of(materials[0]), values.absorption);
     for level in [Level::Avx2, Level::Avx512].into_iter().filter(|level| level.is_available()) {
         assert!(dispatch(level, probe.clone()).remove(0).is_near(&values), "{level:?}");
     }
@@ -172,8 +184,8 @@ fn read(scene: &Scene) -> Values {
 impl Values {
     fn is_near(&self, other: &Self) -> bool {
         let flat = |v: &Self| {
-            let mut all: Vec<f32> = [v.base, v.f0, v.anisotropy, v.iridescence, v.transmission, v.absorption].concat();
-            all.extend([v.metallic, v.roughness].into_iter().chain(v.coat).chain(v.sheen));
+            let mut all: Vec<f32> = [v.base, v.f0, v.anisotropy, v.iridescence].concat();
+            all.extend([v.metallic, v.roughness].into_iter().chain(v.coat).chain(v.sheen).chain(v.transmission));
             all.extend(v.coat_normal.iter().flatten().chain(&v.diffuse_transmission));
             all
         };
@@ -207,6 +219,42 @@ fn clearcoat_is_read_with_its_three_textures() {
     assert!(scene.meshes[0].tangents.is_some() && material(&scene).normal.texture.is_none());
     let absent = read(&load(&json!({"KHR_materials_clearcoat": {"clearcoatFactor": 1}})));
     assert_eq!(absent.coat, [1.0, 0.0]);
+}
+
+/// Share of the first material's own light that gets through its coat, seen at the cosine.
+struct ThroughCoat<'a>(&'a MaterialTable, &'a TextureTable, f32);
+
+impl Kernel for ThroughCoat<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> f32 {
+        let half = L::F::splat(0.5);
+        let mut uvs = UvSets::<L>::single(L::F::splat(0.25), half);
+        uvs.set(1, L::F::splat(0.75), half);
+        let (cos, all) = (L::F::splat(self.2), L::M::first(L::N));
+        self.0.emission_through_coat::<L>(self.1, L::U::splat(0), cos, &uvs, all).first()
+    }
+}
+
+#[test]
+fn coat_takes_its_reflectance_at_index_1_5_from_the_light_of_what_it_lies_over() {
+    let mut textured = json!({"KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.7}});
+    let plain = load(&textured);
+    textured["KHR_materials_clearcoat"]["clearcoatTexture"] = texture();
+    let textured = load(&textured);
+    let none = load(&json!({}));
+    for cos in [1.0f64, 0.6, 0.2, 0.01] {
+        // Fresnel's equations with Snell's law.
+        let inner = (1.0 - (1.0 - cos * cos) / 2.25).sqrt();
+        let (s, p) = ((cos - 1.5 * inner) / (cos + 1.5 * inner), (1.5 * cos - inner) / (1.5 * cos + inner));
+        let reflectance = (0.5 * (s * s + p * p)) as f32;
+        for (scene, coat) in [(&plain, 0.5), (&textured, 0.5 * R), (&none, 0.0)] {
+            let (table, textures) = tables(scene);
+            let found = dispatch(Level::best(), ThroughCoat(&table, &textures, cos as f32));
+            near(&[found], &[1.0 - coat * reflectance]);
+        }
+    }
 }
 
 #[test]
@@ -279,9 +327,10 @@ fn transmission_volume_and_dispersion_are_read() {
     let thin = json!({"KHR_materials_transmission": {"transmissionFactor": 0.5}});
     let scene = load(&thin);
     let values = read(&scene);
-    assert_eq!((values.transmission, values.is_volume), ([0.5, 1.5, 0.0], false));
+    assert_eq!((values.transmission, values.is_volume), ([0.5, 1.5], false));
     let (table, _) = tables(&scene);
-    assert!(table.has_transmission() && table.has_thin_glass() && !table.has_volume() && !table.has_dispersion());
+    let media = MediumTable::new(&scene.materials);
+    assert!(table.has_transmission() && media.has_thin_glass() && !media.has_volume() && !media.has_dispersion());
     let thick = json!({
         "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture": texture()},
         "KHR_materials_ior": {"ior": 1.25},
@@ -289,13 +338,14 @@ fn transmission_volume_and_dispersion_are_read() {
         "KHR_materials_volume": {"thicknessFactor": 2, "attenuationColor": [1, 0.5, 0], "attenuationDistance": 4}});
     let scene = two_sets(&thick).set("/materials/0/doubleSided", json!(true)).load().unwrap();
     let values = read(&scene);
-    near(&values.transmission, &[0.5 * R, 1.25, 0.5]);
+    near(&values.transmission, &[0.5 * R, 1.25]);
     assert!(values.is_volume && !material(&scene).double_sided, "boundaries ignore doubleSided");
-    near(&values.absorption[..2], &[0.0, 2.0_f32.ln() / 4.0]);
-    assert_eq!(values.absorption[2], 1e20);
-    let (table, _) = tables(&scene);
-    assert!(table.has_volume() && table.has_dispersion() && !table.has_thin_glass());
-    assert_eq!(table.ior_of(0), 1.25);
+    let media = MediumTable::new(&scene.materials);
+    assert!(media.has_volume() && media.has_dispersion() && !media.has_thin_glass());
+    // KHR_materials_dispersion: between the lines F and C the index falls by (n - 1) dispersion / 20.
+    let found = dispatch(Level::Scalar, Inside(&media));
+    near(&found[..4], &[1.0, 2.0_f32.powf(-0.25), 0.0, 1.25]);
+    near(&[found[4] - found[5]], &[0.25 * 0.5 / 20.0]);
 }
 
 #[test]
@@ -490,7 +540,7 @@ fn lane_does_not_depend_on_its_neighbours() {
             if !alone.has_extras {
                 assert_eq!((values.coat, values.transmission[0], values.is_volume), ([0.0; 2], 0.0, false));
                 (values.anisotropy, values.iridescence) = ([0.0; 3], [0.0; 3]);
-                (values.transmission, values.diffuse_transmission) = ([0.0; 3], [0.0; 4]);
+                (values.transmission, values.diffuse_transmission) = ([0.0; 2], [0.0; 4]);
             }
             (values.has_extras, alone.has_extras) = (true, true);
             assert_eq!(values, alone, "material {i}");

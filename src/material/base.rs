@@ -13,10 +13,14 @@ use super::film::Film;
 use super::lobes::fresnel::{dielectric, normal_incidence};
 use super::lobes::ggx::{Visible, distribution, masking};
 use super::surface::Surface;
-use crate::math::lanes::{cos_sin_2pi, lerp, pow5, safe_sqrt};
+use super::through::Through;
+use crate::math::lanes::{cos_sin_2pi, pow5, safe_sqrt};
 use crate::math::{Frame, V3};
 use simd::{Float, Lanes, Mask};
 use std::f32::consts::FRAC_1_PI;
+
+#[path = "base_albedo.rs"]
+mod albedo;
 
 /// Below this alpha the specular lobe is a mirror.
 pub const DELTA_ALPHA: f32 = 1e-4;
@@ -76,28 +80,6 @@ pub struct Base<'e, L: Lanes, const RICH: bool> {
     is_seen: L::M,
     /// Some lane has a specular lobe. Only a shortcut: a lane's bits must not depend on its neighbours.
     has_specular: bool,
-}
-
-/// What goes through.
-struct Through<L: Lanes> {
-    /// Reflectance of the boundary at normal incidence.
-    f0: V3<L>,
-    /// Of what the specular layer lets pass: the share that goes on, times the tint.
-    tint: V3<L>,
-    /// Share of the dielectric that is transparent.
-    share: L::F,
-    /// What the transparent part's specular lobes are multiplied by.
-    gain: L::F,
-    /// Refracted; else the surface is thin and light goes on as it came.
-    is_volume: L::M,
-    /// Index of refraction behind over before.
-    eta: L::F,
-    /// `eta` is 1: there is no boundary.
-    is_none: L::M,
-    /// Coefficient of the diffuse lobe on the other side.
-    diffuse: V3<L>,
-    /// Lanes that have that lobe.
-    has_behind: L::M,
 }
 
 /// A sampled local direction.
@@ -183,10 +165,10 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                 this.alpha = [along.or_else(this.is_stretched, smooth), smooth];
                 this.is_delta = is_delta & !this.is_stretched;
                 if is_full {
-                    this.stretched = Some(energy.stretched_row::<L>(smooth, extras.anisotropy));
+                    this.stretched = Some(energy.stretched_row::<L>(smooth, extras.anisotropy, class));
                 }
             }
-            this.film = Film::new(extras, f0, base);
+            this.film = Film::new(extras, f0, base, metallic);
         }
         let [ax, ay] = this.alpha;
         this.visible = Visible::all_in(sees_all, wo, ax, ay);
@@ -195,19 +177,18 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let toward = this.albedo_toward(wo);
         let white = toward[0];
         let mean = this.mean();
-        let mean_rise = this.row.mean_rise;
+        let mean_rise = this.mean_rise();
         let all = V3::<L>::splat([1.0; 3]);
         let mut metal_mean = base.scale(L::F::splat(20.0 / 21.0)) + V3::splat([1.0 / 21.0; 3]);
         let mut layer_mean = (f0 + (all - f0).scale(mean_rise)).scale(specular);
         let mut metal_toward = this.metal(wo.z);
         let mut layer_toward = (f0 + (all - f0).scale(toward[1])).scale(specular);
+        let (plain_mean, plain_toward) = (layer_mean, layer_toward);
         if RICH && let Some(film) = &this.film {
-            (metal_mean, layer_mean) = film.mean(energy, &this.row, metal_mean, layer_mean, specular);
-            (metal_toward, layer_toward) =
-                film.average(energy, &this.row, this.wo.z, metal_toward, layer_toward, specular);
+            (metal_mean, layer_mean) = film.average(this.mean_shares(), metal_mean, layer_mean, specular);
+            (metal_toward, layer_toward) = film.average(this.shares(wo), metal_toward, layer_toward, specular);
         }
-        let mut shadowed = zero;
-        let mut shadowed_mean = zero;
+        let (mut shadowed, mut shadowed_mean) = (V3::<L>::zero(), V3::<L>::zero());
         if is_full {
             let lost = one - white;
             let lost_mean = (one - mean).max(L::F::splat(1e-6));
@@ -216,11 +197,14 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             let coefficient = metal_again.scale(metallic) + layer_again.scale(opaque * (one - share));
             this.multiple = coefficient.scale(lost / lost_mean);
             this.layer = [f0.max_component() * specular, layer_again.max_component()];
-            shadowed = layer_toward.max_component() * white + this.layer[1] * lost;
-            shadowed_mean = layer_mean.max_component() * mean + this.layer[1] * (one - mean);
-            let left = (one - shadowed) / (one - shadowed_mean).max(L::F::splat(1e-4));
-            let left = if RICH { left.max(zero) } else { left };
-            this.diffuse = this.diffuse.scale(left * (one - share));
+            shadowed = all.scale(layer_toward.max_component() * white + this.layer[1] * lost);
+            shadowed_mean = all.scale(layer_mean.max_component() * mean + this.layer[1] * (one - mean));
+            if RICH && let Some(film) = &mut this.film {
+                let again = film.set_again(layer_again);
+                shadowed = film.taken(layer_toward, plain_toward).scale(white) + again.scale(lost);
+                shadowed_mean = film.taken(layer_mean, plain_mean).scale(mean) + again.scale(one - mean);
+            }
+            this.diffuse = (this.diffuse * Self::left(shadowed, shadowed_mean)).scale(one - share);
         } else {
             this.diffuse = this.diffuse.scale(one - share);
         }
@@ -235,12 +219,13 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                     gain = thin;
                     if is_volume.any() {
                         let rough = one / energy.glass::<L>(eta, smooth, wo.z, specular);
-                        gain = rough.or_else(is_volume, thin);
+                        // What reflects everything (index 0) lets nothing through and so is as what is thin.
+                        gain = rough.or_else(is_volume & ior.gt(zero), thin);
                     }
                     gain = one.or_else(this.is_delta | is_none | share.eq(zero), gain);
                 }
-                let tinted =
-                    extras.diffuse_transmission_color * this.diffuse_white(opaque, share, shadowed, shadowed_mean);
+                let white = Self::left(shadowed, shadowed_mean).scale(opaque * (one - share));
+                let tinted = extras.diffuse_transmission_color * white;
                 // The boundary's reflectance against what is before it, with the colour it has against air.
                 let own = normal_incidence::<L>(ior).max(L::F::splat(1e-12));
                 let f0 = f0.scale(normal_incidence::<L>(eta) / own).min(V3::splat([1.0; 3]));
@@ -263,23 +248,15 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let (mut passed, mut behind) = (V3::zero(), V3::zero());
         if RICH && let Some(through) = &this.through {
             passed = through.tint.scale(opaque * share * (one - layer_toward.max_component()));
-            behind = through.diffuse.scale(one - shadowed_mean);
+            behind = through.diffuse * (all - shadowed_mean);
         }
-        let diffused = this.multiple.scale(one - mean) + this.diffuse.scale(one - shadowed_mean);
+        let diffused = this.multiple.scale(one - mean) + this.diffuse * (all - shadowed_mean);
         let (s, d, b) = ((reflected + passed).max_component(), diffused.max_component(), behind.max_component());
         this.albedo = s + d + b;
         let sum = this.albedo.max(L::F::splat(1e-30));
         this.specular_pmf = (s / sum).min(one);
         this.behind_pmf = b / sum;
         base_closure
-    }
-
-    /// White of the diffuse base, but for the layer's share towards `wi`.
-    #[inline(always)]
-    fn diffuse_white(&self, opaque: L::F, share: L::F, shadowed: L::F, shadowed_mean: L::F) -> V3<L> {
-        let one = L::F::one();
-        let left = ((one - shadowed) / (one - shadowed_mean).max(L::F::splat(1e-4))).max(L::F::zero());
-        V3::<L>::splat([1.0; 3]).scale(opaque * (one - share) * left)
     }
 
     /// The same with the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the
@@ -295,34 +272,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     #[inline(always)]
     fn diffuse_cosine(&self, wi: V3<L>) -> L::F {
         if self.has_split { wi.dot(self.diffuse_normal).or_else(self.is_split, wi.z) } else { wi.z }
-    }
-
-    /// Albedo of GGX reflecting everything, and the rise of Fresnel's curve, towards `w` (w.z > 0).
-    #[inline(always)]
-    fn albedo_toward(&self, w: V3<L>) -> [L::F; 2] {
-        if !self.is_full {
-            return [L::F::one(), pow5(L::F::one() - w.z.min(L::F::one()))];
-        }
-        let found = self.energy.albedo::<L>(&self.row, w.z);
-        let (mut white, mut found_rise) = (found.white, found.rise);
-        if RICH && let Some(stretched) = &self.stretched {
-            white = self.energy.stretched::<L>(stretched, w).or_else(self.is_stretched, white);
-            // The tilt of normals towards `w` is what counts for the cosines between them.
-            let row = self.energy.row_at::<L>(&self.row, stretched.toward(w));
-            found_rise = self.energy.albedo::<L>(&row, w.z).rise.or_else(self.is_stretched, found_rise);
-        }
-        // A mirror's curve is Fresnel's own.
-        let rise = self.rise(w.z, self.ior, pow5(L::F::one() - w.z.min(L::F::one())));
-        [L::F::one().or_else(self.is_delta, white), rise.or_else(self.is_delta, found_rise)]
-    }
-
-    /// Mean of the albedo of GGX reflecting everything.
-    #[inline(always)]
-    fn mean(&self) -> L::F {
-        match &self.stretched {
-            Some(stretched) if RICH => stretched.mean.or_else(self.is_stretched, self.row.mean),
-            _ => self.row.mean,
-        }
     }
 
     /// Fresnel's reflectance of the metal at cosine `c` between view and half vector.
@@ -377,21 +326,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         pow5(one - other).or_else(ior.gt(zero) & ior.lt(one), s5)
     }
 
-    /// Share of the specular layer towards `wi` that the diffuse base does not get, in addition to the viewer's.
-    #[inline(always)]
-    fn under(&self, wi: V3<L>, albedo: [L::F; 2]) -> L::F {
-        let one = L::F::one();
-        let [white, rise] = albedo;
-        let [f0, again] = self.layer;
-        let mut layer = lerp(f0, self.weight, rise);
-        if RICH && let Some(film) = &self.film {
-            layer = film.largest(self.energy, &self.row, wi.z, layer, self.weight);
-        }
-        let left = one - layer * white - again * (one - white);
-        // A film's shares add up to 1 but for rounding.
-        if RICH { left.max(L::F::zero()) } else { left }
-    }
-
     /// Coefficients of the specular lobes at the half vector `h` with `c = wo . h`: reflected and transmitted.
     #[inline(always)]
     fn at_half(&self, c: L::F) -> (V3<L>, V3<L>, V3<L>) {
@@ -403,8 +337,15 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         };
         let kept = layer.scale(one - through.share);
         let gained = kept + boundary.scale(through.share * through.gain).masked(!through.is_none);
-        let passes = one.or_else(through.is_none, one - boundary.max_component());
-        let passed = through.tint.scale(opaque * through.share * through.gain * passes);
+        let all = V3::<L>::splat([1.0; 3]);
+        let mut taken = all.scale(boundary.max_component());
+        if self.is_full
+            && let Some(film) = &self.film
+        {
+            taken = taken.or_else(through.is_volume, film.taken(boundary, boundary));
+        }
+        let passes = all.or_else(through.is_none, all - taken);
+        let passed = (through.tint * passes).scale(opaque * through.share * through.gain);
         (metal.scale(self.metallic) + gained.scale(opaque), passed, layer)
     }
 
@@ -441,7 +382,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         if self.is_full {
             let albedo = self.albedo_toward(up);
             let under = self.under(up, albedo);
-            diffuse = self.diffuse.scale(under) + self.multiple.scale(one - albedo[0]);
+            diffuse = self.diffuse * under + self.multiple.scale(one - albedo[0]);
         } else {
             diffuse = diffuse.scale(one - layer.max_component());
         }
@@ -496,9 +437,10 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let pdf = bent_pdf.or_else(through.is_volume, self.visible.pdf_reflected(d));
         let specular_pdf = (pdf * (one - self.reflects(reflected, passed))).masked(glossy);
         let cosine_pdf = ((-self.diffuse_cosine(wi)).max(zero) * L::F::splat(FRAC_1_PI)).masked(below);
-        let left = if self.is_full { self.under(flipped, self.albedo_toward(flipped)) } else { one };
-        let left = one.or_else(self.is_diffuse, left);
-        let f_cos = through.diffuse.scale(left * cosine_pdf) + specular;
+        let all = V3::<L>::splat([1.0; 3]);
+        let left = if self.is_full { self.under(flipped, self.albedo_toward(flipped)) } else { all };
+        let left = all.or_else(self.is_diffuse, left);
+        let f_cos = through.diffuse * left.scale(cosine_pdf) + specular;
         let pdf = self.behind_pmf * cosine_pdf + self.specular_pmf * specular_pdf;
         BsdfValue { f_cos: f_cos.or_else(below, value.f_cos), pdf: pdf.or_else(below, value.pdf) }
     }

@@ -2,9 +2,9 @@
 //! for the Modeling of Varying Iridescence", in the form of the extension's text, for RGB.
 //!
 //! The film replaces Fresnel's reflectance, so its albedo depends on roughness in a way of its own: it is put together
-//! from the film's reflectance at a few cosines and the shares of the albedo that come from there.
+//! from the film's reflectance at some cosines and the shares of the albedo that come from there.
 
-use super::energy::{Energy, FILM_NODES, Row, film_cosine};
+use super::energy::{FILM_NODES, film_cosine};
 use super::surface::Extras;
 use crate::math::V3;
 use crate::math::lanes::{cos_sin_2pi, exp, lerp, pow5, safe_sqrt};
@@ -22,13 +22,15 @@ pub struct Film<L: Lanes> {
     /// Over the dielectric at the nodes' cosines: largest channel, and colour.
     at_nodes: [V3<L>; FILM_NODES],
     metal_at_nodes: [V3<L>; FILM_NODES],
+    /// See [`Film::set_again`].
+    again: V3<L>,
 }
 
 impl<L: Lanes> Film<L> {
     /// `None` where no lane has a film. `layer_f0` is the dielectric's reflectance at normal incidence, `metal_f0` the
-    /// metal's.
+    /// metal's; `metallic` is the share of the metal.
     #[inline(always)]
-    pub fn new(extras: &Extras<L>, layer_f0: V3<L>, metal_f0: V3<L>) -> Option<Self> {
+    pub fn new(extras: &Extras<L>, layer_f0: V3<L>, metal_f0: V3<L>, metallic: L::F) -> Option<Self> {
         let has = extras.iridescence.gt(L::F::zero());
         if !simd::Mask::any(has) {
             return None;
@@ -41,11 +43,19 @@ impl<L: Lanes> Film<L> {
             layer_f0,
             at_nodes: [V3::zero(); FILM_NODES],
             metal_at_nodes: [V3::zero(); FILM_NODES],
+            again: V3::zero(),
         };
+        // Half of what a film costs: what no lane has any of is left out.
+        let has_layer = simd::Mask::any(metallic.lt(L::F::one()));
+        let has_metal = simd::Mask::any(metallic.gt(L::F::zero()));
         for k in 0..FILM_NODES {
             let c = L::F::splat(film_cosine(k));
-            film.at_nodes[k] = film.reflectance(c, layer_f0);
-            film.metal_at_nodes[k] = film.reflectance(c, metal_f0);
+            if has_layer {
+                film.at_nodes[k] = film.reflectance(c, layer_f0);
+            }
+            if has_metal {
+                film.metal_at_nodes[k] = film.reflectance(c, metal_f0);
+            }
         }
         Some(film)
     }
@@ -58,28 +68,9 @@ impl<L: Lanes> Film<L> {
         (metal.lerp(over_metal, self.factor), layer.lerp(over_layer, self.factor))
     }
 
-    /// Cosine-weighted means, as [`Film::fresnel`].
+    /// Averages as [`Film::fresnel`] over light of which the nodes' cosines have these `shares`.
     #[inline(always)]
-    pub fn mean(&self, energy: &Energy, row: &Row<L>, metal: V3<L>, layer: V3<L>, weight: L::F) -> (V3<L>, V3<L>) {
-        self.mix(energy.film_mean_shares(row), metal, layer, weight)
-    }
-
-    /// Averages over what GGX reflects towards cosine `mu`, as [`Film::fresnel`].
-    #[inline(always)]
-    pub fn average(
-        &self,
-        energy: &Energy,
-        row: &Row<L>,
-        mu: L::F,
-        metal: V3<L>,
-        layer: V3<L>,
-        weight: L::F,
-    ) -> (V3<L>, V3<L>) {
-        self.mix(energy.film_shares(row, mu), metal, layer, weight)
-    }
-
-    #[inline(always)]
-    fn mix(&self, shares: [L::F; FILM_NODES], metal: V3<L>, layer: V3<L>, weight: L::F) -> (V3<L>, V3<L>) {
+    pub fn average(&self, shares: [L::F; FILM_NODES], metal: V3<L>, layer: V3<L>, weight: L::F) -> (V3<L>, V3<L>) {
         let (mut over_metal, mut over_layer) = (V3::zero(), V3::zero());
         for ((share, metal), layer) in shares.into_iter().zip(&self.metal_at_nodes).zip(&self.at_nodes) {
             over_metal = metal.mul_add(share, over_metal);
@@ -88,15 +79,36 @@ impl<L: Lanes> Film<L> {
         (metal.lerp(over_metal, self.factor), layer.lerp(over_layer.scale(weight), self.factor))
     }
 
-    /// The largest channel of the dielectric's average towards cosine `mu`, where without the film it is `layer`.
+    /// What the dielectric layer takes from what is below it, of its reflectance `mixed` with the film and `plain` without.
+    /// Without a film that is the largest channel of all (the extensions' `rgb_mix`), so that the base does not get the
+    /// layer's complementary colours. What a film does not reflect it lets through, colour by colour: white stays white.
     #[inline(always)]
-    pub fn largest(&self, energy: &Energy, row: &Row<L>, mu: L::F, layer: L::F, weight: L::F) -> L::F {
-        let shares = energy.film_shares(row, mu);
+    pub fn taken(&self, mixed: V3<L>, plain: V3<L>) -> V3<L> {
+        let largest = V3::<L>::splat([1.0; 3]).scale(plain.max_component());
+        mixed + (largest - plain).scale(L::F::one() - self.factor)
+    }
+
+    /// Sets the layer's reflectance of light that was reflected more than once; what is taken of it.
+    #[inline(always)]
+    pub fn set_again(&mut self, again: V3<L>) -> V3<L> {
+        self.again = self.taken(again, again);
+        self.again
+    }
+
+    /// What was set.
+    #[inline(always)]
+    pub fn again(&self) -> V3<L> {
+        self.again
+    }
+
+    /// What the layer takes of light with these `shares`, where without the film it takes `layer`.
+    #[inline(always)]
+    pub fn toward(&self, shares: [L::F; FILM_NODES], layer: L::F, weight: L::F) -> V3<L> {
         let mut over_layer = V3::zero();
         for (share, layer) in shares.into_iter().zip(&self.at_nodes) {
             over_layer = layer.mul_add(share, over_layer);
         }
-        lerp(layer, over_layer.max_component() * weight, self.factor)
+        V3::<L>::splat([1.0; 3]).scale(layer).lerp(over_layer.scale(weight), self.factor)
     }
 
     /// Of the film over a base of reflectance `base_f0` at normal incidence, seen from air at cosine `c`; in [0, 1].
@@ -122,14 +134,36 @@ impl<L: Lanes> Film<L> {
         let mut cm = V3::<L>::new(x.rs - t121, y.rs - t121, z.rs - t121);
         let r = V3::<L>::new(x.r, y.r, z.r);
         let turns = V3::<L>::new(x.turn, y.turn, z.turn);
-        for m in [1.0, 2.0] {
+        for s in sensitivities::<L>(path, turns) {
             cm = cm * r;
-            let s = sensitivity::<L>(path * L::F::splat(m), turns.scale(L::F::splat(m)));
             sum = sum + (cm * s).scale(L::F::splat(2.0));
         }
         let all = V3::<L>::splat([1.0; 3]);
         all.or_else(is_total, sum.max(V3::zero()).min(all))
     }
+}
+
+/// `shares` with the mean of Schlick's `(1 - c)^5` brought to `schlick`, by weights that are linear in that: what a round
+/// lobe's shares become in a stretched one. They still add up to what they did.
+#[inline(always)]
+pub fn tilted<L: Lanes>(shares: [L::F; FILM_NODES], schlick: L::F) -> [L::F; FILM_NODES] {
+    let (zero, one) = (L::F::zero(), L::F::one());
+    let (mut mean, mut square) = (zero, zero);
+    for (k, &share) in shares.iter().enumerate() {
+        let rise = L::F::splat((1.0 - film_cosine(k)).powi(5));
+        mean = rise.mul_add(share, mean);
+        square = (rise * rise).mul_add(share, square);
+    }
+    let tiny = L::F::splat(1e-12);
+    let slope = (schlick - mean) / (square - mean * mean).max(tiny);
+    // No share may become negative.
+    let slope = slope.min(one / mean.max(tiny)).max(-one / (one - mean).max(tiny));
+    let mut tilted = shares;
+    for (k, share) in tilted.iter_mut().enumerate() {
+        let rise = L::F::splat((1.0 - film_cosine(k)).powi(5));
+        *share = *share * (rise - mean).mul_add(slope, one).max(zero);
+    }
+    tilted
 }
 
 /// One channel's second interface.
@@ -165,14 +199,20 @@ fn normal_incidence<L: Lanes>(a: L::F, b: L::F) -> L::F {
     r * r
 }
 
-/// Response of RGB to a wave that is `path` nm and `turns` of phase behind, over that to one that is not: the Fourier
-/// transforms of the eye's sensitivities as Gaussians.
+/// Responses of RGB to waves that are `path` nm and `turns` of phase behind, and twice as much, over that to one that is
+/// not: the Fourier transforms of the eye's sensitivities as Gaussians.
 #[inline(always)]
-fn sensitivity<L: Lanes>(path: L::F, turns: V3<L>) -> V3<L> {
-    let x = lobe::<L>(path, turns.x, 5.4856e-13, 1.6810e6, 4.3278e9)
-        + lobe::<L>(path, turns.x, 9.7470e-14, 2.2399e6, 4.5282e9);
+fn sensitivities<L: Lanes>(path: L::F, turns: V3<L>) -> [V3<L>; 2] {
+    let x = lobe::<L>(path, turns.x, 5.4856e-13, 1.6810e6, 4.3278e9);
+    let far_x = lobe::<L>(path, turns.x, 9.7470e-14, 2.2399e6, 4.5282e9);
     let y = lobe::<L>(path, turns.y, 4.4201e-13, 1.7953e6, 9.3046e9);
     let z = lobe::<L>(path, turns.z, 5.2481e-13, 2.2084e6, 6.6121e9);
+    [rgb(x[0] + far_x[0], y[0], z[0]), rgb(x[1] + far_x[1], y[1], z[1])]
+}
+
+/// Linear Rec.709 of CIE XYZ.
+#[inline(always)]
+fn rgb<L: Lanes>(x: L::F, y: L::F, z: L::F) -> V3<L> {
     let f = |v: f32| L::F::splat(v);
     V3::new(
         x.mul_add(f(3.240_454_2), y.mul_add(f(-1.537_138_5), z * f(-0.498_531_4))),
@@ -181,13 +221,17 @@ fn sensitivity<L: Lanes>(path: L::F, turns: V3<L>) -> V3<L> {
     )
 }
 
+/// One Gaussian's response to a wave and to one twice as far behind: of that the phase is double and the decay the fourth
+/// power, which is half of what a film costs.
 #[inline(always)]
-fn lobe<L: Lanes>(path: L::F, turn: L::F, value: f64, position: f64, variance: f64) -> L::F {
+fn lobe<L: Lanes>(path: L::F, turn: L::F, value: f64, position: f64, variance: f64) -> [L::F; 2] {
     use std::f64::consts::TAU;
-    let height = (value * (TAU * variance).sqrt() / 1.0685e-7) as f32;
+    let height = L::F::splat((value * (TAU * variance).sqrt() / 1.0685e-7) as f32);
     // Radians per nm are 2 pi x 1e-9 x position: in turns, 1e-9 x position.
     let at = path * L::F::splat((position * 1e-9) as f32) + turn;
     let (cos, _) = cos_sin_2pi::<L>(at - at.floor());
-    let decay = L::F::splat(-((TAU * 1e-9).powi(2) * variance) as f32);
-    L::F::splat(height) * cos * exp::<L>(path * path * decay)
+    let decay = exp::<L>(path * path * L::F::splat(-((TAU * 1e-9).powi(2) * variance) as f32));
+    let decay2 = decay * decay;
+    let double = (cos + cos).mul_add(cos, -L::F::one());
+    [height * cos * decay, height * double * (decay2 * decay2)]
 }

@@ -146,13 +146,15 @@ impl<'e> Layered<'e> {
         if let Some((coat, frame)) = &self.coat
             && u_lobe.lt(self.coat_pmf).any()
         {
-            let wi = frame.to_world(coat.sample(u));
+            let sampled = coat.sample(u);
+            let wi = frame.to_world(sampled);
             if coat.is_delta().any() {
                 let weight = V3::<Scalar>::splat([1.0; 3]).scale(coat.mirror() / self.coat_pmf);
                 let pdf = F::splat(f32::INFINITY);
                 return BsdfSample { wi, weight, pdf, valid: M::first(1), transmitted: none, straight: none };
             }
-            return self.weigh(wi, none, M::first(1));
+            // Below its own horizon the coat has no density, but other lobes may: what is lost there is none of theirs.
+            return self.weigh(wi, none, sampled.z.gt(zero));
         }
         let u_lobe = u_lobe - self.coat_pmf;
         if let Some(sheen) = &self.sheen
@@ -163,7 +165,10 @@ impl<'e> Layered<'e> {
         let share = (one - self.coat_pmf - self.sheen_pmf).max(F::splat(1e-30));
         let u_lobe = ((u_lobe - self.sheen_pmf) / share).max(zero).min(F::splat(1.0 - f32::EPSILON / 2.0));
         match &self.ground {
-            Ground::Disney(disney) => self.weigh(self.frame.to_world(disney.sample(u, u_lobe)), none, M::first(1)),
+            Ground::Disney(disney) => {
+                let sampled = disney.sample(u, u_lobe);
+                self.weigh(self.frame.to_world(sampled), none, sampled.z.gt(zero))
+            }
             Ground::Base(base) => {
                 let sample = base.sample(u, u_lobe);
                 let wi = self.frame.to_world(sample.wi);

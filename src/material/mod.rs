@@ -12,6 +12,7 @@ pub mod lobes;
 pub mod media;
 pub mod surface;
 pub mod table;
+mod through;
 
 use crate::texture::{Channels, Param, TextureRef};
 use extensions::{Anisotropy, Clearcoat, DiffuseTransmission, Disney, Iridescence, Sheen, Transmission, Volume};

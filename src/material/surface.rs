@@ -48,8 +48,6 @@ pub struct Extras<L: Lanes> {
     pub transmission: L::F,
     /// The surface is the boundary of a volume: light is refracted; else it is thin-walled.
     pub is_volume: L::M,
-    /// `dispersion`: 20 / Abbe number.
-    pub dispersion: L::F,
     /// `diffuseTransmissionFactor`, in [0, 1].
     pub diffuse_transmission: L::F,
     /// `diffuseTransmissionColor`, in [0, 1].

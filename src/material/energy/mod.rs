@@ -6,12 +6,15 @@
 //! so that a lookup is one load a lane.
 
 pub mod quadrature;
+mod stretched;
 pub mod tables;
 
 use crate::math::V3;
 use crate::math::lanes::lerp;
 use simd::{Float, Lanes, Uint};
-use tables::{GLASS, GLASS_MOST, NODES, SIDE, STRETCHED, stored};
+pub use stretched::Stretched;
+use stretched::StretchedTables;
+use tables::{GLASS, GLASS_MOST, NODES, SIDE, stored};
 
 /// Which formulas surfaces follow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,17 +88,15 @@ pub struct Energy {
     iors: Vec<f32>,
     /// By eta; empty in scenes without rough glass.
     glass: Vec<[f32; 4]>,
-    /// By anisotropy; empty in scenes without.
-    stretched: Vec<[f32; 4]>,
-    stretched_means: Vec<[f32; 4]>,
+    stretched: StretchedTables,
     /// Per node, its shares; empty in scenes without films.
     hats: Vec<[f32; 4]>,
     /// Per roughness, the means of those.
     mean_hats: Vec<[f32; 4]>,
 }
 
-/// Cosines at which a film's reflectance is taken.
-pub const FILM_NODES: usize = 8;
+/// Cosines at which a film's reflectance is taken: all that are stored. With half as many a film of 1200 nm gains 2 %.
+pub const FILM_NODES: usize = NODES;
 const RECORDS: u32 = FILM_NODES as u32 / 4;
 
 /// Cosine of node `k`.
@@ -148,9 +149,9 @@ impl Energy {
     pub fn new(brdf: Brdf) -> Self {
         let white = cells(SIDE, SIDE, |j, i| stored().white[j * SIDE + i]);
         let empty = Vec::new;
-        let (rise, means, glass, stretched, stretched_means) = (empty(), empty(), empty(), empty(), empty());
-        let (hats, mean_hats) = (empty(), empty());
-        Self { brdf, white, rise, means, iors: Vec::new(), glass, stretched, stretched_means, hats, mean_hats }
+        let (rise, means, glass, hats, mean_hats) = (empty(), empty(), empty(), empty(), empty());
+        let stretched = StretchedTables::default();
+        Self { brdf, white, rise, means, iors: Vec::new(), glass, stretched, hats, mean_hats }
     }
 
     /// The number of the tables for dielectrics of index `ior` (>= 1, or 0 for infinite), made on first use.
@@ -188,17 +189,7 @@ impl Energy {
 
     /// Makes the tables of thin films.
     pub fn add_film(&mut self) {
-        // From the stored nodes to fewer.
-        let fewer = |shares: &[f32]| {
-            let mut sums = [0.0; FILM_NODES];
-            for (k, &share) in shares.iter().enumerate() {
-                let (low, part) = tables::between_nodes(tables::node_cosine(k, NODES), FILM_NODES);
-                sums[low] += share * (1.0 - part as f32);
-                sums[low + 1] += share * part as f32;
-            }
-            sums
-        };
-        let hats: Vec<f32> = stored().hats.chunks_exact(NODES).flat_map(fewer).collect();
+        let hats = &stored().hats;
         self.hats = hats.chunks_exact(4).map(|h| [h[0], h[1], h[2], h[3]]).collect();
         for j in 0..SIDE {
             let all = quadrature::mean(256, |mu| white_at(j, mu));
@@ -296,97 +287,6 @@ impl Energy {
         let fresnel = lerp(corners::<L>(&self.glass, a, fx, fy), corners::<L>(&self.glass, c, fx, fy), fs);
         let none = lerp(corners::<L>(&self.glass, b, fx, fy), corners::<L>(&self.glass, d, fx, fy), fs);
         lerp(none, fresnel, specular)
-    }
-
-    /// Makes the tables of anisotropic surfaces.
-    pub fn add_stretched(&mut self) {
-        let [nl, nk, nj, ni] = STRETCHED;
-        let stored = &stored().stretched;
-        for slice in stored.chunks(nj * ni) {
-            self.stretched.extend(cells(ni, nj, |j, i| slice[j * ni + i]));
-        }
-        let mean = |k: usize, l: usize| {
-            let alphas = tables::stretch(tables::alpha_at(tables::node(k, nk)), tables::node(l, nl));
-            let slice = &stored[(l * nk + k) * nj * ni..][..nj * ni];
-            let at_azimuth = |j: usize| {
-                let [x2, y2] = [1.0 - tables::node(j, nj), tables::node(j, nj)];
-                let alpha = (alphas[0] * alphas[0] * x2 + alphas[1] * alphas[1] * y2).sqrt();
-                quadrature::mean(256, |mu| {
-                    let x = (mu * (1.0 + alpha) / (mu + alpha)).sqrt() * (ni - 1) as f64;
-                    let i = (x as usize).min(ni - 2);
-                    let (a, b) = (f64::from(slice[j * ni + i]), f64::from(slice[j * ni + i + 1]));
-                    a + (b - a) * (x - i as f64)
-                })
-            };
-            let rows: Vec<f64> = (0..nj).map(at_azimuth).collect();
-            // Uniform in azimuth; the rows are linear in its squared sine.
-            let n = 64;
-            let azimuths = (0..n).map(|i| ((i as f64 + 0.5) / n as f64 * std::f64::consts::FRAC_PI_2).sin().powi(2));
-            let along = azimuths.map(|p| {
-                let at = p * (nj - 1) as f64;
-                let j = (at as usize).min(nj - 2);
-                rows[j] + (rows[j + 1] - rows[j]) * (at - j as f64)
-            });
-            lost((along.sum::<f64>() / n as f64) as f32)
-        };
-        self.stretched_means = cells(nl, nk, mean);
-    }
-
-    /// Where anisotropic surfaces of `alpha` across and `strength` are.
-    #[inline(always)]
-    pub fn stretched_row<L: Lanes>(&self, alpha: L::F, strength: L::F) -> Stretched<L> {
-        let [nl, nk, ..] = STRETCHED;
-        let (l, fl) = cell::<L>(strength, nl);
-        let (k, fk) = cell::<L>(alpha.sqrt(), nk);
-        let mean = kept::<L>(corners::<L>(&self.stretched_means, k * L::U::splat(nl as u32 - 1) + l, fl, fk));
-        let along = alpha + (L::F::one() - alpha) * strength * strength;
-        Stretched { alphas: [along, alpha], first: l * L::U::splat(nk as u32) + k, fl, fk, mean }
-    }
-
-    /// The albedo of anisotropic GGX reflecting everything, towards the unit vector `w`, w.z > 0.
-    #[inline(always)]
-    pub fn stretched<L: Lanes>(&self, row: &Stretched<L>, w: V3<L>) -> L::F {
-        let one = L::F::one();
-        let [_, nk, nj, ni] = STRETCHED;
-        let (x2, y2) = (w.x * w.x, w.y * w.y);
-        let p = y2 / (x2 + y2).max(L::F::splat(1e-20));
-        let alpha = row.toward(w);
-        let (i, fx) = cell::<L>((w.z * (one + alpha) / (w.z + alpha)).sqrt(), ni);
-        let (j, fy) = cell::<L>(p, nj);
-        let size = L::U::splat(((ni - 1) * (nj - 1)) as u32);
-        let within = j * L::U::splat(ni as u32 - 1) + i;
-        let at = row.first * size + within;
-        let [a, b] = [at, at + size];
-        let far = size * L::U::splat(nk as u32);
-        let [c, d] = [a + far, b + far];
-        let table = &self.stretched;
-        let low = lerp(corners::<L>(table, a, fx, fy), corners::<L>(table, b, fx, fy), row.fk);
-        let high = lerp(corners::<L>(table, c, fx, fy), corners::<L>(table, d, fx, fy), row.fk);
-        lerp(low, high, row.fl)
-    }
-}
-
-/// [`Row`] of anisotropic surfaces.
-#[derive(Clone, Copy)]
-pub struct Stretched<L: Lanes> {
-    /// Along and across.
-    alphas: [L::F; 2],
-    first: L::U,
-    fl: L::F,
-    fk: L::F,
-    /// Cosine-weighted mean of the albedo.
-    pub mean: L::F,
-}
-
-impl<L: Lanes> Stretched<L> {
-    /// Alpha in the azimuth of `w`.
-    #[inline(always)]
-    pub fn toward(&self, w: V3<L>) -> L::F {
-        let (x2, y2) = (w.x * w.x, w.y * w.y);
-        let [ax, ay] = self.alphas;
-        let all = (x2 + y2).max(L::F::splat(1e-20));
-        // Straight from above it does not matter.
-        ((ax * ax * x2 + ay * ay * y2) / all).sqrt().max(ax.min(ay))
     }
 }
 

@@ -5,7 +5,7 @@
 //! | `white` | root roughness, cosine | albedo E of GGX reflecting everything |
 //! | `hats` | root roughness, root cosine, node | share of E that comes from normals at the node's cosine to the viewer |
 //! | `glass` | reflectance, roughness, cosine, 2 | what a refracting boundary gives back, with Fresnel and without |
-//! | `stretched` | anisotropy, roughness, azimuth, cosine | E of anisotropic GGX |
+//! | `stretched` | anisotropy, roughness, azimuth, cosine, 2 | E of anisotropic GGX, and (by root cosine) the fifth root of the mean of Schlick's `(1 - c)^5` over it |
 
 use super::quadrature::{direction, reflected, reflections, refracted};
 use std::sync::OnceLock;
@@ -19,8 +19,8 @@ pub const NODES: usize = 32;
 pub const GLASS: [usize; 3] = [25, 24, 24];
 /// Index of refraction 4.
 pub const GLASS_MOST: f64 = 0.6;
-/// Nodes of `stretched`: of anisotropy, roughness, squared sine of the azimuth, cosine.
-pub const STRETCHED: [usize; 4] = [13, 20, 8, 20];
+/// Nodes of `stretched`: of anisotropy, roughness, azimuth (as [`azimuth_alpha`] has it), cosine.
+pub const STRETCHED: [usize; 4] = [13, 20, 10, 20];
 
 /// All tables, each value in [0, 1].
 pub struct Tables {
@@ -30,7 +30,7 @@ pub struct Tables {
     pub hats: Vec<f32>,
     /// `[eta][roughness][cosine][2]`.
     pub glass: Vec<f32>,
-    /// `[anisotropy][roughness][azimuth][cosine]`.
+    /// `[anisotropy][roughness][azimuth][cosine][2]`.
     pub stretched: Vec<f32>,
 }
 
@@ -39,7 +39,7 @@ const LENGTHS: [usize; 4] = [
     SIDE * SIDE,
     SIDE * SIDE * NODES,
     GLASS[0] * GLASS[1] * GLASS[2] * 2,
-    STRETCHED[0] * STRETCHED[1] * STRETCHED[2] * STRETCHED[3],
+    STRETCHED[0] * STRETCHED[1] * STRETCHED[2] * STRETCHED[3] * 2,
 ];
 
 /// The stored tables, unpacked once.
@@ -124,18 +124,30 @@ pub fn stretch(alpha: f64, strength: f64) -> [f64; 2] {
     [alpha + (1.0 - alpha) * strength * strength, alpha]
 }
 
-/// `stretched` at a node.
-pub fn stretched(l: usize, k: usize, j: usize, i: usize, points: usize) -> f64 {
-    let alpha = alpha_at(node(k, STRETCHED[1]));
-    let alphas = stretch(alpha, node(l, STRETCHED[0]));
-    let phi = node(j, STRETCHED[2]).sqrt().asin();
-    let mu = stretched_cosine(node(i, STRETCHED[3]), alphas, phi).max(1e-9);
-    reflected(direction(mu, phi), alphas, points, |_| 1.0)
+/// Alpha that counts in the azimuth of node `x` in [0, 1]: its root is even between those across and along. What light
+/// does at grazing incidence changes as fast with azimuth as with that.
+pub fn azimuth_alpha(x: f64, [ax, ay]: [f64; 2]) -> f64 {
+    (ay.sqrt() + (ax.sqrt() - ay.sqrt()) * x).powi(2)
 }
 
-/// [`cosine_at`] for the alpha that counts in azimuth `phi`.
-pub fn stretched_cosine(x: f64, [ax, ay]: [f64; 2], phi: f64) -> f64 {
-    cosine_at(x, ((ax * phi.cos()).powi(2) + (ay * phi.sin()).powi(2)).sqrt())
+/// `stretched` at a node.
+pub fn stretched(l: usize, k: usize, j: usize, i: usize, points: usize) -> [f64; 2] {
+    let across = alpha_at(node(k, STRETCHED[1]));
+    let [ax, ay] = stretch(across, node(l, STRETCHED[0]));
+    let alpha = azimuth_alpha(node(j, STRETCHED[2]), [ax, ay]);
+    // alpha^2 = (ax cos phi)^2 + (ay sin phi)^2; round where there is no difference.
+    let cos2 = if ax > ay { ((alpha * alpha - ay * ay) / (ax * ax - ay * ay)).clamp(0.0, 1.0) } else { 1.0 };
+    let x = node(i, STRETCHED[3]);
+    let reflections = |mu: f64, visit: &mut dyn FnMut(f64, f64)| {
+        reflections(direction(mu, cos2.sqrt().acos()), [ax, ay], points, visit);
+    };
+    let (mut white, mut all, mut rise) = (0.0, 0.0, 0.0);
+    reflections(cosine_at(x, alpha).max(1e-9), &mut |_, share| white += share);
+    reflections((x * x).max(1e-7), &mut |c, share| {
+        all += share;
+        rise += share * (1.0 - c).max(0.0).powi(5);
+    });
+    [white, (rise / all).powf(0.2)]
 }
 
 /// Makes the tables, `points` x `points` normals a value, and packs them as they are stored.
@@ -148,9 +160,9 @@ pub fn make(points: usize) -> Vec<u8> {
         let (k, j, i) = (n / (GLASS[1] * GLASS[2]), n / GLASS[2] % GLASS[1], n % GLASS[2]);
         glass(k, j, i, points).to_vec()
     });
-    let stretched = (0..LENGTHS[3]).into_par_iter().map(|n| {
+    let stretched = (0..LENGTHS[3] / 2).into_par_iter().map(|n| {
         let [_, a, b, c] = STRETCHED;
-        vec![stretched(n / (a * b * c), n / (b * c) % a, n / c % b, n % c, points / 2)]
+        stretched(n / (a * b * c), n / (b * c) % a, n / c % b, n % c, points / 4).to_vec()
     });
     let values: Vec<Vec<f64>> = white.chain(hats).chain(glass).chain(stretched).collect();
     let packed = |v: &f64| ((v.clamp(0.0, 1.0) * 65535.0).round() as u16).to_le_bytes();

@@ -11,9 +11,15 @@ use crate::math::V3;
 use simd::{Float, Lanes};
 
 /// Index of refraction.
-const IOR: f32 = 1.5;
+pub const IOR: f32 = 1.5;
 /// Reflectance at normal incidence.
 const F0: f32 = 0.04;
+
+/// Reflectance of a smooth coat at cosine `cos` >= 0.
+#[inline(always)]
+pub fn reflectance<L: Lanes>(cos: L::F) -> L::F {
+    fresnel::dielectric::<L>(cos, L::F::splat(IOR))
+}
 
 /// A coat as seen from one direction. In lanes without one, and where its normal is turned from the viewer, there is none.
 pub struct Coat<L: Lanes> {
@@ -39,10 +45,10 @@ impl<L: Lanes> Coat<L> {
         let smooth = roughness * roughness;
         let is_delta = smooth.lt(L::F::splat(DELTA_ALPHA)) & is_on;
         let alpha = smooth.max(L::F::splat(DELTA_ALPHA));
-        let reflectance = fresnel::dielectric::<L>(wo.z, L::F::splat(IOR));
+        let smooth_albedo = reflectance::<L>(wo.z);
         let [ratio, white] = tables::coat::<L>(wo.z, roughness);
         let boost = (one - white) * L::F::splat(F0) / white + one;
-        let albedo = reflectance.or_else(is_delta, (reflectance * ratio).min(one));
+        let albedo = smooth_albedo.or_else(is_delta, (smooth_albedo * ratio).min(one));
         Self {
             wo,
             factor,
@@ -86,10 +92,10 @@ impl<L: Lanes> Coat<L> {
         let glossy = wi.z.gt(L::F::zero()) & self.is_on & !self.is_delta;
         let wi = V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12)));
         let h = (self.wo + wi).normalized();
-        let reflectance = fresnel::dielectric::<L>(self.wo.dot(h), L::F::splat(IOR));
+        let fresnel = reflectance::<L>(self.wo.dot(h));
         let d = ggx::distribution(h, self.alpha, self.alpha);
         let lambda = ggx::masking(self.wo, self.alpha, self.alpha) + ggx::masking(wi, self.alpha, self.alpha);
-        let f_cos = self.factor * self.boost * reflectance * d / ((one + lambda) * L::F::splat(4.0) * self.wo.z);
+        let f_cos = self.factor * self.boost * fresnel * d / ((one + lambda) * L::F::splat(4.0) * self.wo.z);
         let f_cos = f_cos.masked(glossy);
         BsdfValue { f_cos: V3::new(f_cos, f_cos, f_cos), pdf: self.visible.pdf_reflected(d).masked(glossy) }
     }

@@ -5,7 +5,7 @@ use super::tables::{COAT_COLUMNS, COAT_ROWS, COAT_WARP, SHEEN_COLUMNS, SHEEN_LEA
 use std::f64::consts::{PI, TAU};
 
 /// Index of refraction of a coat.
-pub const COAT_IOR: f64 = 1.5;
+pub const COAT_IOR: f64 = super::coat::IOR as f64;
 
 /// [`super::sheen::LEAST_ROUGHNESS`].
 const SHEEN_LEAST_ROUGHNESS: f64 = super::sheen::LEAST_ROUGHNESS as f64;

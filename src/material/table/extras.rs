@@ -3,7 +3,7 @@
 use super::{EXTRAS_SHIFT, MaterialTable, tangent_normal, texel};
 use crate::material::Material;
 use crate::material::extensions::Iridescence;
-use crate::material::lobes::fresnel::dielectric;
+use crate::material::lobes::coat;
 use crate::material::surface::{DisneyExtras, Extras};
 use crate::math::lanes::lerp;
 use crate::math::{UvSets, V3};
@@ -11,10 +11,7 @@ use crate::texture::lookup::{Encoding, TextureTable};
 use crate::texture::mips::Average;
 use simd::{Float, Lanes, Mask, Uint};
 
-const RECORDS: u32 = 11;
-
-/// `KHR_materials_clearcoat`: index of refraction of the coat.
-const COAT_IOR: f32 = 1.5;
+const RECORDS: u32 = 10;
 
 // Flags of a material; those of a scene are all of its materials' together.
 const COAT: u32 = 1;
@@ -27,18 +24,15 @@ const DIFFUSE_TRANSMISSION: u32 = 1 << 6;
 /// Light that gets through is inside of something.
 pub(super) const VOLUME: u32 = 1 << 7;
 const DISNEY: u32 = 1 << 8;
-const DISPERSION: u32 = 1 << 9;
-/// Specular transmission without a volume.
-const THIN_GLASS: u32 = 1 << 10;
 /// Shading depends on the direction of tangents.
-const STRETCHED: u32 = 1 << 11;
+const STRETCHED: u32 = 1 << 9;
 /// Any of them.
-pub(super) const ANY: u32 = (1 << 12) - 1;
+pub(super) const ANY: u32 = (1 << 10) - 1;
 
 /// Squared length below which the direction in an anisotropy texture is none: 2.5 steps of 8 bits.
 const MIN_DIRECTION2: f32 = 4e-4;
 
-/// Eleven 16-byte records for each material that has any of it.
+/// Ten 16-byte records for each material that has any of it.
 ///
 /// | record | x | y | z | w |
 /// |---|---|---|---|---|
@@ -48,11 +42,10 @@ const MIN_DIRECTION2: f32 = 4e-4;
 /// | 3 | anisotropy | cosine | sine of its rotation | texture |
 /// | 4 | iridescence | index | least | greatest thickness, nm |
 /// | 5 | texture of the iridescence | of the thickness | transmission | its texture |
-/// | 6 | diffuse transmission | texture | texture of the colour | dispersion |
+/// | 6 | diffuse transmission | texture | texture of the colour | - |
 /// | 7 | colour of diffuse transmission r | g | b | - |
-/// | 8 | absorption r | g | b, 1/m | - |
-/// | 9 | Disney: subsurface | specular | specular tint | anisotropic |
-/// | 10 | sheen | sheen tint | clearcoat | clearcoat gloss |
+/// | 8 | Disney: subsurface | specular | specular tint | anisotropic |
+/// | 9 | sheen | sheen tint | clearcoat | clearcoat gloss |
 #[derive(Clone, Debug, Default)]
 pub(super) struct ExtrasTable {
     records: Vec<[f32; 4]>,
@@ -74,9 +67,7 @@ impl ExtrasTable {
         let [sheen_r, sheen_g, sheen_b] = m.sheen.color.factor;
         let (sin, cos) = f64::from(m.anisotropy.rotation).sin_cos();
         let [through_r, through_g, through_b] = m.diffuse_transmission.color.factor;
-        let [absorbed_r, absorbed_g, absorbed_b] = m.interior().map_or([0.0; 3], |volume| volume.absorption());
         let film = m.iridescence;
-        let dispersion = if m.has_dispersion() { m.transmission.dispersion } else { 0.0 };
         let d = m.disney.unwrap_or_default();
         self.records.extend([
             [
@@ -104,10 +95,9 @@ impl ExtrasTable {
                 m.diffuse_transmission.factor.factor,
                 id(m.diffuse_transmission.factor.texture, values),
                 id(m.diffuse_transmission.color.texture, light),
-                dispersion,
+                0.0,
             ],
             [through_r, through_g, through_b, 0.0],
-            [absorbed_r, absorbed_g, absorbed_b, 0.0],
             [d.subsurface, d.specular, d.specular_tint, d.anisotropic],
             [d.sheen, d.sheen_tint, d.clearcoat, d.clearcoat_gloss],
         ]);
@@ -126,7 +116,6 @@ impl ExtrasTable {
 }
 
 fn flags(m: &Material) -> u32 {
-    let has_interior = m.interior().is_some();
     let flags = [
         (m.has_coat(), COAT),
         (m.has_coat() && m.clearcoat.normal.texture.is_some(), COAT_NORMAL),
@@ -135,11 +124,9 @@ fn flags(m: &Material) -> u32 {
         (m.has_iridescence(), IRIDESCENCE),
         (m.has_transmission(), TRANSMISSION),
         (m.has_diffuse_transmission(), DIFFUSE_TRANSMISSION),
-        (has_interior, VOLUME),
+        (m.interior().is_some(), VOLUME),
         (m.is_disney(), DISNEY),
         (m.is_disney() && m.disney.is_some_and(|d| d.anisotropic > 0.0), STRETCHED),
-        (m.has_dispersion(), DISPERSION),
-        (m.has_transmission() && !has_interior, THIN_GLASS),
     ];
     flags.iter().filter(|(has, _)| *has).fold(0, |bits, (_, flag)| bits | flag)
 }
@@ -181,16 +168,6 @@ impl MaterialTable {
         self.extras.has(VOLUME)
     }
 
-    /// Whether anything transmits specularly without being a boundary: shadow rays may pass it.
-    pub fn has_thin_glass(&self) -> bool {
-        self.extras.has(THIN_GLASS)
-    }
-
-    /// Whether any boundary refracts colours differently.
-    pub fn has_dispersion(&self) -> bool {
-        self.extras.has(DISPERSION)
-    }
-
     /// Whether the Disney BRDF of 2012 shades anything.
     pub fn has_disney(&self) -> bool {
         self.extras.has(DISNEY)
@@ -204,57 +181,6 @@ impl MaterialTable {
     fn features<L: Lanes>(&self, material: L::U) -> (L::U, L::U) {
         let flags = self.record::<L>(material, 0)[3].to_bits().shr(EXTRAS_SHIFT);
         (flags, self.record::<L>(material, 7)[0].to_bits())
-    }
-
-    /// The lanes of `active` whose material is the boundary of a volume.
-    #[inline(always)]
-    pub fn boundaries<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
-        if !self.has_volume() {
-            return L::M::from_bits(0);
-        }
-        active & self.features::<L>(material).0.has(VOLUME)
-    }
-
-    /// The lanes of `active` whose material transmits specularly and is no boundary.
-    #[inline(always)]
-    pub fn thin_glass<L: Lanes>(&self, material: L::U, active: L::M) -> L::M {
-        if !self.has_thin_glass() {
-            return L::M::from_bits(0);
-        }
-        active & self.features::<L>(material).0.has(THIN_GLASS)
-    }
-
-    /// Absorption behind the boundary `material`, 1/m per channel, finite; 0 in lanes that are not `active` or no
-    /// boundary.
-    #[inline(always)]
-    pub fn volume<L: Lanes>(&self, material: L::U, active: L::M) -> V3<L> {
-        let boundaries = self.boundaries::<L>(material, active);
-        if !boundaries.any() {
-            return V3::zero();
-        }
-        let [r, g, b, _] = self.extras.record::<L>(self.features::<L>(material).1, 8);
-        V3::<L>::new(r, g, b).masked(boundaries)
-    }
-
-    /// Index of refraction: >= 1, or 0 where everything is reflected.
-    #[inline(always)]
-    pub fn ior<L: Lanes>(&self, material: L::U) -> L::F {
-        self.record::<L>(material, 7)[1]
-    }
-
-    /// [`MaterialTable::volume`] of one material.
-    pub fn volume_of(&self, material: u32) -> [f32; 3] {
-        let Some(&[_, _, _, flags]) = self.records.get((material * super::RECORDS) as usize) else { return [0.0; 3] };
-        if flags.to_bits() >> EXTRAS_SHIFT & VOLUME == 0 {
-            return [0.0; 3];
-        }
-        let place = self.records.get((material * super::RECORDS + 7) as usize).map_or(0, |r| r[0].to_bits());
-        self.extras.records.get((place * RECORDS + 8) as usize).map_or([0.0; 3], |r| [r[0], r[1], r[2]])
-    }
-
-    /// [`MaterialTable::ior`] of one material.
-    pub fn ior_of(&self, material: u32) -> f32 {
-        self.records.get((material * super::RECORDS + 7) as usize).map_or(1.5, |record| record[1])
     }
 }
 
@@ -290,7 +216,6 @@ impl MaterialTable {
             iridescence_thickness: L::F::splat(film.thickness_maximum.factor),
             transmission: zero,
             is_volume: active & flags.has(VOLUME),
-            dispersion: zero,
             diffuse_transmission: zero,
             diffuse_transmission_color: V3::splat([1.0; 3]),
             disney: None,
@@ -322,8 +247,8 @@ impl MaterialTable {
             self.diffuse_transmission(&at, lanes, &mut extras);
         }
         if self.has_disney() && extras.is_disney.any() {
-            let [subsurface, specular, specular_tint, anisotropic] = self.extras.record::<L>(place, 9);
-            let [sheen, sheen_tint, clearcoat, clearcoat_gloss] = self.extras.record::<L>(place, 10);
+            let [subsurface, specular, specular_tint, anisotropic] = self.extras.record::<L>(place, 8);
+            let [sheen, sheen_tint, clearcoat, clearcoat_gloss] = self.extras.record::<L>(place, 9);
             extras.disney = Some(DisneyExtras {
                 subsurface,
                 specular,
@@ -355,12 +280,12 @@ impl MaterialTable {
         if !lanes.any() {
             return one;
         }
-        let [mut coat, _, texture, _] = self.extras.record::<L>(place, 0);
+        let [mut strength, _, texture, _] = self.extras.record::<L>(place, 0);
         // At level 0, as emission: light sampling knows no footprint.
         if let Some((t, has)) = texel::<L>(textures, texture, &uvs.sharp(), lanes, Encoding::Linear) {
-            coat = (coat * t.rgb.x).or_else(has, coat);
+            strength = (strength * t.rgb.x).or_else(has, strength);
         }
-        (one - coat * dielectric::<L>(cos, L::F::splat(COAT_IOR))).or_else(lanes, one)
+        (one - strength * coat::reflectance::<L>(cos)).or_else(lanes, one)
     }
 
     #[inline(always)]
@@ -430,9 +355,6 @@ impl MaterialTable {
             factor = (factor * t.rgb.x).or_else(has, factor);
         }
         into.transmission = factor.masked(lanes);
-        if self.has_dispersion() {
-            into.dispersion = self.extras.record::<L>(at.place, 6)[3].masked(lanes);
-        }
     }
 
     #[inline(always)]

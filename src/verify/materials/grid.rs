@@ -113,7 +113,6 @@ impl Cell {
             iridescence_thickness: f(self.thickness),
             transmission: f(self.transmission),
             is_volume: M::first(usize::from(self.is_volume)),
-            dispersion: f(0.0),
             diffuse_transmission: f(0.0),
             diffuse_transmission_color: V3::splat([1.0; 3]),
             disney: None,
