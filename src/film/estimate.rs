@@ -50,19 +50,16 @@ impl Differences {
 }
 
 impl Film {
-    /// The estimated error of [`Film::mean`]; `None` with fewer than four samples, or where nothing was seen but black.
+    /// The estimated error of `pixels`, which are [`Film::mean`]; `None` with fewer than four samples, or where nothing was seen but black.
     ///
     /// # Panics
     /// When a unit is missing.
-    pub fn error(&self) -> Option<ErrorEstimate> {
+    pub fn error(&self, pixels: &[[f32; 3]]) -> Option<ErrorEstimate> {
         if self.blocks.len() < BLOCKS as usize {
             return None;
         }
-        let pixels = self.mean();
         let count = pixels.len() as f64;
-        let grey = |pixel: &[f32; 3]| pixel.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-        let greys: Vec<f64> = pixels.iter().map(grey).collect();
-        let mean = greys.iter().sum::<f64>() / count;
+        let mean = pixels.iter().map(grey).sum::<f64>() / count;
         if mean.is_nan() || mean <= 0.0 {
             return None;
         }
@@ -74,7 +71,7 @@ impl Film {
             let Differences { halves, quarters } = differences(blocks);
             // A pixel that is too bright by a lucky sample would be told that it may be off by more.
             let width = self.window.width as usize;
-            let greys = [among_neighbours(&greys, width, x, y), greys[y * width + x]];
+            let greys = [among_neighbours(pixels, width, x, y), grey(&pixels[y * width + x])];
             let [weight, own] = greys.map(|grey| 1.0 / (grey * grey + MEAN_WEIGHT * mean * mean));
             cell.halves += weight * halves;
             cell.quarters += weight * quarters;
@@ -110,22 +107,26 @@ fn sum<'a>(cells: impl Iterator<Item = &'a Differences>) -> Differences {
     })
 }
 
-/// The luminance of [`Film::mean`] at `x`, `y`, at least that of the darkest neighbour and at most that of the third brightest:
+fn grey(pixel: &[f32; 3]) -> f64 {
+    pixel.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
+}
+
+/// The luminance of `pixels` at `x`, `y`, at least that of the darkest neighbour and at most that of the third brightest:
 /// inside of a corner that is brighter than what is around it there are three.
-fn among_neighbours(greys: &[f64], width: usize, x: usize, y: usize) -> f64 {
-    let height = greys.len() / width;
+fn among_neighbours(pixels: &[[f32; 3]], width: usize, x: usize, y: usize) -> f64 {
+    let height = pixels.len() / width;
     let (mut near, mut n) = ([0.0; 8], 0);
     for row in y.saturating_sub(1)..(y + 2).min(height) {
         for column in x.saturating_sub(1)..(x + 2).min(width) {
             if (column, row) != (x, y) {
-                near[n] = greys[row * width + column];
+                near[n] = grey(&pixels[row * width + column]);
                 n += 1;
             }
         }
     }
     let near = &mut near[..n];
     near.sort_unstable_by(f64::total_cmp);
-    let own = greys[y * width + x];
+    let own = grey(&pixels[y * width + x]);
     // A picture of one pixel has no neighbours.
     if n < BRIGHT { own } else { own.clamp(near[0], near[n - BRIGHT]) }
 }
@@ -177,7 +178,7 @@ mod tests {
     #[test]
     fn adp_02_of_independent_samples_the_error_is_their_deviation_over_the_root_of_their_number() {
         let film = film(|pixel, sample| hash(pixel * 64 + sample + 1));
-        let found = film.error().unwrap();
+        let found = film.error(&film.mean()).unwrap();
         // Uniform: deviation 1 / sqrt(12), mean 1/2.
         let expected = (1.0 / 12.0_f64 / 64.0 / (0.25 * 1.01)).sqrt();
         assert!((found.value / expected - 1.0).abs() < 0.03, "{found:?} {expected}");
@@ -194,7 +195,7 @@ mod tests {
             let stratum = (sample.reverse_bits() >> 26) as f32;
             (stratum + hash(pixel * 64 + sample + 1)) / 64.0
         });
-        let found = film.error().unwrap();
+        let found = film.error(&film.mean()).unwrap();
         let actual: f64 = film.mean().iter().map(|p| (f64::from(p[0]) - 0.5).powi(2)).sum::<f64>() / 4096.0;
         let actual = (actual / (0.25 * 1.01)).sqrt();
         let independent = (1.0 / 12.0_f64 / 64.0 / (0.25 * 1.01)).sqrt();
@@ -212,13 +213,14 @@ mod tests {
                 (0..16).for_each(|pixel| samples.clone().for_each(|_| sums.add(pixel, [radiance; 3])));
                 film.store(i, &sums);
             }
-            assert_eq!(film.error(), None, "{spp} {radiance}");
+            assert_eq!(film.error(&film.mean()), None, "{spp} {radiance}");
         }
     }
 
     #[test]
     fn adp_02_a_picture_without_noise_has_no_error() {
-        let found = film(|pixel, _| 1.0 + pixel as f32).error().unwrap();
+        let film = film(|pixel, _| 1.0 + pixel as f32);
+        let found = film.error(&film.mean()).unwrap();
         assert_eq!((found.value, found.ci95), (0.0, [0.0, 0.0]));
     }
 }

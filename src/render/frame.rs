@@ -92,7 +92,7 @@ pub fn render_prepared(
         return Err(RenderError::Interrupted);
     }
     let pixels = film.mean();
-    let error = film.error();
+    let error = film.error(&pixels);
     let render_seconds = start.elapsed().as_secs_f64();
 
     let features = features(scene, &prepared);

@@ -122,7 +122,7 @@ struct Patch {
 }
 
 /// Patches are split so often whatever they say: slivers of a lobe in the corner of a cell are not to be missed.
-const SHALLOWEST: u32 = 2;
+const SHALLOWEST: u32 = 3;
 
 /// Deeper than this a patch is taken as it is: 1/256 of a cell's side.
 const DEEPEST: u32 = 8;
