@@ -15,6 +15,9 @@ pub trait Lanes: Copy + Send + Sync + 'static {
 
     /// Runs `part` as a function of its own, compiled for the same level: large kernels take the compiler less when cut
     /// into parts, and a part that is called twice is there once.
+    ///
+    /// The shading kernel in one piece took LLVM 100 to 145 s at each level; in parts the library builds in a third of the
+    /// time and pictures take 1 to 2 % longer.
     fn outline<P: Part<Self>>(part: P) -> P::Output;
 }
 
