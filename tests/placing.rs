@@ -301,7 +301,8 @@ fn a_few_instances_are_merged_and_lamps_are_always() {
     assert!(few.considered[0].placed == 0 && few.considered[0].why.starts_with("placing"), "{few:?}");
     let lamps = row(scenes::lamp(0.0, 5.0), 1, 3);
     let ready = prepared_as(&lamps, AccelChoice::Linear, Choice::Always);
-    assert_eq!((ready.placed.instances, ready.tables.lights.len()), (0, 23_400));
+    let lights = &ready.tables.lights;
+    assert_eq!((ready.placed.instances, lights.len(), lights.emissive_triangles()), (0, 3, 23_400));
     assert!(ready.placed.considered[0].why.contains("emits light"));
 }
 

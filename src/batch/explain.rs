@@ -135,7 +135,9 @@ pub struct TexturePlan {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct LightPlan {
-    /// Those that are sampled.
+    /// Glowing meshes where they are placed: a light each.
+    pub emissive_meshes: usize,
+    /// Their triangles.
     pub emissive_triangles: u64,
     pub point: usize,
     pub spot: usize,
@@ -459,20 +461,12 @@ fn describe_prepared(scene: &Scene, prepared: &Prepared, plan: &mut Explanation)
     });
     let count = |kind: fn(&Light) -> bool| scene.lights.iter().filter(|placed| kind(&placed.light)).count();
     let environment = tables.lights.has_environment();
-    let sampled = tables.lights.len() - usize::from(environment);
-    // The table leaves out those that do not shine at all.
-    let shining = scene.lights.iter().filter(|placed| shines(&placed.light)).count();
     plan.lights = Some(LightPlan {
-        emissive_triangles: sampled.saturating_sub(shining) as u64,
+        emissive_meshes: tables.lights.emissive_meshes(),
+        emissive_triangles: tables.lights.emissive_triangles() as u64,
         point: count(|light| matches!(light, Light::Point { .. })),
         spot: count(|light| matches!(light, Light::Spot { .. })),
         directional: count(|light| matches!(light, Light::Directional { .. })),
         environment,
     });
-}
-
-fn shines(light: &Light) -> bool {
-    let (Light::Point { intensity: c } | Light::Spot { intensity: c, .. } | Light::Directional { illuminance: c }) =
-        light;
-    c.iter().sum::<f32>() > 0.0
 }

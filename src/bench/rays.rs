@@ -255,9 +255,11 @@ fn towards_lights(prepared: &Prepared, points: &[SurfacePoint], n: usize, seed: 
 
 /// Points chosen on lights, one for each surface point of a chunk.
 struct LightSamples {
-    /// Surface points, then random numbers.
+    /// Surface points with their normals, then random numbers.
     from: [Vec<f32>; 3],
-    u: [Vec<f32>; 3],
+    normal: [Vec<f32>; 3],
+    u: [Vec<f32>; 4],
+    scratch: Vec<f32>,
     towards: [Vec<f32>; 3],
     end: [Vec<f32>; 3],
     valid: Vec<u32>,
@@ -268,7 +270,9 @@ impl Default for LightSamples {
     fn default() -> Self {
         let three = || [0, 1, 2].map(|_| vec![0.0; POOL]);
         let (valid, distant) = (vec![0; POOL], vec![0; POOL]);
-        Self { from: three(), u: three(), towards: three(), end: three(), valid, distant }
+        let u = [0, 1, 2, 3].map(|_| vec![0.0; POOL]);
+        let (from, normal, scratch) = (three(), three(), Vec::new());
+        Self { from, normal, u, scratch, towards: three(), end: three(), valid, distant }
     }
 }
 
@@ -277,9 +281,13 @@ impl LightSamples {
         for (i, point) in points.iter().enumerate() {
             for axis in 0..3 {
                 self.from[axis][i] = point.p[axis];
-                self.u[axis][i] = random.unit();
+                self.normal[axis][i] = point.ng[axis];
+            }
+            for u in &mut self.u {
+                u[i] = random.unit();
             }
         }
+        self.scratch.resize(prepared.tables.lights.scratch(), 0.0);
         dispatch_large(Level::best().without_portable(), Choose { prepared, samples: self });
     }
 
@@ -303,11 +311,17 @@ impl Kernel for Choose<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let tables = &self.prepared.tables;
-        let LightSamples { from, u, towards, end, valid, distant } = self.samples;
+        let LightSamples { from, normal, u, scratch, towards, end, valid, distant } = self.samples;
         for at in (0..POOL).step_by(L::N) {
             let p = V3::<L>::new(L::F::load(&from[0], at), L::F::load(&from[1], at), L::F::load(&from[2], at));
-            let u = [L::F::load(&u[0], at), L::F::load(&u[1], at), L::F::load(&u[2], at)];
-            let light = tables.lights.sample::<L>(p, u, &tables.triangles, &tables.materials, &tables.textures);
+            let n = V3::<L>::new(L::F::load(&normal[0], at), L::F::load(&normal[1], at), L::F::load(&normal[2], at));
+            let u = [
+                L::F::load(&u[0], at),
+                L::F::load(&u[1], at),
+                L::F::load(&u[2], at),
+                L::F::load(&u[3], at),
+            ];
+            let light = tables.lights.sample(&tables.lights.receiver::<L>(p, n), u, tables.sources(), scratch);
             light.wi.x.store(&mut towards[0], at);
             light.wi.y.store(&mut towards[1], at);
             light.wi.z.store(&mut towards[2], at);

@@ -22,7 +22,7 @@ fn tables() -> SceneTables {
     let uvs = [[[0.1, 0.1], [3.1, 0.1], [0.1, 0.6]], [[0.0, 0.0], [0.0, 1.0], [4.0, 0.0]]];
     let attributes = triangles.push_attributes(&Corners { normals: None, uvs: &uvs, colors: Some([[1.0; 4]; 3]) });
     triangles.push([Vec3::ZERO, 2.0 * Vec3::X, 2.0 * Vec3::Y], Vec3::Z, 0, attributes, NONE);
-    let lights = LightTable::new(&[], None, &mut triangles);
+    let lights = LightTable::new(Vec::new(), None, 1.0, &mut triangles);
     SceneTables {
         triangles,
         placements: PlacementTable::with_capacity(0),

@@ -2,26 +2,33 @@
 
 use super::SceneTables;
 use super::interaction::Interaction;
+use super::receiver::{self, Remembered};
 use crate::math::V3;
-use simd::{Float, Lanes, Mask, Part};
+use crate::shape::table::NONE;
+use simd::{Float, Lanes, Mask, Part, Uint};
 
 /// Radiance that the surfaces of `hit` send back along the ray, weighed against having sampled it as a light, and the
-/// lanes that have any. `distance` (metres) from the last scattering, whose direction had the density `prev_pdf` (1/sr).
+/// lanes that have any. `distance` (metres) from the last scattering, whose direction had the density `prev_pdf` (1/sr) and
+/// whose light was chosen from what `from` remembers of the paths `at ..`.
 #[inline(always)]
 pub(super) fn emitted<L: Lanes>(
     tables: &SceneTables,
     si: &Interaction<L>,
+    from: &Remembered,
+    at: usize,
     distance: L::F,
     prev_pdf: L::F,
     hit: L::M,
 ) -> (V3<L>, L::M) {
-    L::outline(Emitted { tables, si, distance, prev_pdf, hit })
+    L::outline(Emitted { tables, si, from, at, distance, prev_pdf, hit })
 }
 
 /// [`emitted`].
 struct Emitted<'a, L: Lanes> {
     tables: &'a SceneTables,
     si: &'a Interaction<L>,
+    from: &'a Remembered,
+    at: usize,
     distance: L::F,
     prev_pdf: L::F,
     hit: L::M,
@@ -32,7 +39,7 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
 
     #[inline(always)]
     fn run(self) -> (V3<L>, L::M) {
-        let Self { tables, si, distance, prev_pdf, hit } = self;
+        let Self { tables, si, from, at, distance, prev_pdf, hit } = self;
         let (materials, material) = (&tables.materials, si.triangle.material);
         let mut le: V3<L> = materials.emission(&tables.textures, material, si.front, &si.uvs, hit);
         let lit = hit & le.max_component().gt(L::F::zero());
@@ -45,8 +52,15 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
         }
         // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
         // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
-        let pdf_light = si.triangle.light_density * distance * distance / si.wo.dot(si.triangle.ng).abs();
-        let ratio = pdf_light / prev_pdf;
+        // Nothing samples what is no light, nor what camera rays and mirrors show.
+        let light = si.triangle.light;
+        let sampled = lit & prev_pdf.is_finite() & !light.eq(L::U::splat(NONE));
+        if !sampled.any() {
+            return (le, lit);
+        }
+        let density = tables.lights.density::<L>(light) * distance * distance / si.wo.dot(si.triangle.ng).abs();
+        let pmf = tables.lights.pmf::<L>(light, receiver::load(tables, from, at));
+        let ratio: L::F = (pmf * density / prev_pdf).masked(sampled);
         (le.scale(L::F::one() / ratio.mul_add(ratio, L::F::one())), lit)
     }
 }

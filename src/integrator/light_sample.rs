@@ -6,6 +6,7 @@ use super::interaction::Interaction;
 use super::medium::Crossing;
 use super::pool::PathPool;
 use super::shade::add_lanes;
+use crate::light::choice::Receiver;
 use crate::math::V3;
 use simd::{Float, Lanes, Mask};
 
@@ -15,6 +16,8 @@ pub(super) struct Vertex<'a, L: Lanes> {
     pub closure: &'a Closure<'a, L>,
     /// `None` in scenes without volumes.
     pub crossing: Option<&'a Crossing<L>>,
+    /// What chooses the light.
+    pub receiver: &'a Receiver<L>,
     /// Where rays start that are reflected.
     pub start: V3<L>,
     /// Throughput.
@@ -23,18 +26,19 @@ pub(super) struct Vertex<'a, L: Lanes> {
     pub slot: L::U,
 }
 
-/// Queues a shadow ray with its finished contribution for a light chosen by `u`; the lanes of `scatters` that have one.
+/// Queues a shadow ray with its finished contribution for a light chosen by `u`; the lanes of `scatters` that have one, and
+/// the sums of importances that the choice was made by.
 #[inline(always)]
 pub(super) fn queue_light_sample<L: Lanes>(
     tables: &SceneTables,
     pool: &mut PathPool,
     vertex: &Vertex<'_, L>,
-    u: [L::F; 3],
+    u: [L::F; 4],
     scatters: L::M,
-) -> L::M {
-    let Vertex { si, closure, crossing, start, beta, slot } = *vertex;
+) -> (L::M, L::F) {
+    let Vertex { si, closure, crossing, receiver, start, beta, slot } = *vertex;
     let (zero, one) = (L::F::zero(), L::F::one());
-    let light = tables.lights.sample::<L>(si.origin, u, &tables.triangles, &tables.materials, &tables.textures);
+    let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
     let ratio = value.pdf / light.pdf;
     let weight = one.or_else(light.is_delta, one / ratio.mul_add(ratio, one));
@@ -58,5 +62,5 @@ pub(super) fn queue_light_sample<L: Lanes>(
     let direction = light.wi.or_else(light.is_distant, to_light);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
     pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);
-    cast
+    (cast, light.total)
 }

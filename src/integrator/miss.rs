@@ -3,6 +3,7 @@
 use super::SceneTables;
 use super::medium::Stack;
 use super::pool::PathPool;
+use super::receiver;
 use super::shade::{add_lanes, load3};
 use crate::math::V3;
 use simd::{Float, Lanes, Mask, Part};
@@ -37,7 +38,8 @@ impl<L: Lanes> Part<L> for See<'_, L> {
             beta = beta * tables.media.transmittance_from_far(Stack::<L>::load(&pool.media, at).innermost());
         }
         let (radiance, pdf): (V3<L>, L::F) = tables.lights.environment::<L>(direction);
-        let ratio = pdf / L::F::load(&pool.prev_pdf, at);
+        let pmf = tables.lights.pmf_of_environment(receiver::load::<L>(tables, &pool.from, at));
+        let ratio = pmf * pdf / L::F::load(&pool.prev_pdf, at);
         let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
         add_lanes::<L>(pool, slot, (beta * radiance).scale(weight), missed);
     }

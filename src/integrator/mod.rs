@@ -14,6 +14,7 @@ mod medium;
 mod miss;
 mod normals;
 mod pool;
+mod receiver;
 mod shade;
 mod terminator;
 mod through;
@@ -26,7 +27,7 @@ pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;
 use crate::camera::{CameraRays, PixelFilter};
-use crate::light::table::LightTable;
+use crate::light::table::{LightTable, Sources};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::shape::placement::PlacementTable;
@@ -53,6 +54,11 @@ pub struct SceneTables {
 }
 
 impl SceneTables {
+    /// What light samples are read from.
+    pub fn sources(&self) -> Sources<'_> {
+        Sources { triangles: &self.triangles, materials: &self.materials, textures: &self.textures }
+    }
+
     /// Whether any surface is shaded with another normal than its triangle's.
     pub(crate) fn has_shading_normals(&self) -> bool {
         self.triangles.has_normals() || self.triangles.has_tangents() || self.materials.has_bump()

@@ -2,6 +2,7 @@
 
 use super::SceneTables;
 use super::medium::DEPTH;
+use super::receiver::{self, Remembered};
 use super::through::Glass;
 use crate::accel::{HitBatch, RayBatch};
 use crate::material::media::AIR;
@@ -47,6 +48,10 @@ pub struct PathPool {
     pub cone_spread: Buffer<f32>,
     /// What shadow rays through thin glass need; `None` where there is none.
     pub glass: Option<Box<Glass>>,
+    /// From where its last light was chosen (`receiver.rs`).
+    pub from: Remembered,
+    /// What choosing a light needs.
+    pub light_scratch: Buffer<f32>,
     /// Where the path's radiance is.
     pub slot: Buffer<u32>,
 
@@ -95,6 +100,8 @@ impl PathPool {
             cone_width: Buffer::new(0),
             cone_spread: Buffer::new(0),
             glass: None,
+            from: std::array::from_fn(|_| Buffer::new(0)),
+            light_scratch: Buffer::new(0),
             slot: ints(),
             radiance: vec![[0.0; 3]; POOL],
             origin: vec![(0, 0); POOL],
@@ -125,6 +132,12 @@ impl PathPool {
         if tables.textures.has_levels() && self.cone_width.is_empty() {
             (self.cone_width, self.cone_spread) = (Buffer::new(ROOM), Buffer::new(ROOM));
         }
+        if tables.lights.has_choice() && self.from[0].is_empty() {
+            self.from = std::array::from_fn(|_| Buffer::new(ROOM));
+        }
+        if self.light_scratch.len() < tables.lights.scratch() {
+            self.light_scratch = Buffer::new(tables.lights.scratch());
+        }
     }
 
     /// Path `i` starts: outside of everything.
@@ -141,6 +154,7 @@ impl PathPool {
         if !self.passes.is_empty() {
             (self.travelled[i], self.passes[i]) = (0.0, 0);
         }
+        receiver::begin(&mut self.from, i);
     }
 
     /// Appends shadow rays of the lanes `keep`, packed: where they start, their direction and end (in units of it), whom

@@ -9,6 +9,7 @@ use super::light_sample::{Vertex, queue_light_sample};
 use super::medium::{Crossing, Stack};
 use super::miss::see_environment;
 use super::pool::PathPool;
+use super::receiver::{self, receiver};
 use super::wave::Counters;
 use crate::accel::MISS;
 use crate::material::media::{AIR, MediumTable};
@@ -118,7 +119,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
 
     if tables.materials.is_emissive() {
         let prev_pdf = L::F::load(&pool.prev_pdf, at);
-        let (radiance, lit) = emitted(tables, &si, distance, prev_pdf, hit);
+        let (radiance, lit) = emitted(tables, &si, &pool.from, at, distance, prev_pdf, hit);
         if lit.any() {
             add_lanes::<L>(pool, slot, beta * radiance, lit);
         }
@@ -135,11 +136,15 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let closure = closure::<L>(tables, &pool.hits, at, &si, eta, shaded);
     let start = si.start();
 
+    let receiver = receiver(tables, &si, &closure);
+    let mut expected = L::F::zero();
     if !tables.lights.is_empty() {
         let u = key.group(vertex + vertex + L::U::splat(dims::FIRST_LIGHT));
         let to = pool.n_shadow;
-        let here = Vertex { si: &si, closure: &closure, crossing: crossing.as_ref(), start, beta, slot };
-        let cast = queue_light_sample::<L>(tables, pool, &here, [u[0], u[1], u[2]], scatters);
+        let (closure, crossing) = (&closure, crossing.as_ref());
+        let here = Vertex { si: &si, closure, crossing, receiver: &receiver, start, beta, slot };
+        let (cast, total) = queue_light_sample::<L>(tables, pool, &here, u, scatters);
+        expected = total;
         if tables.materials.has_alpha() {
             coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow.key, to);
         }
@@ -215,6 +220,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
     if let Some(cone) = &cone {
         cone.follow(pool, to, sample.pdf, straight | culled, alive);
+    }
+    if tables.lights.has_choice() {
+        receiver::follow(pool, at, to, (&receiver, expected), straight | culled, alive);
     }
     slot.compress(active & !alive, &mut pool.dead, pool.n_dead);
     pool.n_dead += (active & !alive).count();

@@ -10,6 +10,7 @@
 
 use super::Environment;
 use crate::math::{V3, angle, distribution, lanes::cos_sin_2pi};
+use glam::DVec3;
 use simd::{Float, Lanes, Uint};
 use std::f64::consts::PI;
 
@@ -100,6 +101,21 @@ impl EnvironmentTable {
         table.texels.extend(records(h - 1, 0.0));
         distribution::push_ends(&shares, &mut table.rows);
         Some(table)
+    }
+
+    /// Each texel: unit direction of its centre in world axes, radiance (nits, mean over channels), solid angle (sr).
+    pub fn samples(&self) -> impl Iterator<Item = (DVec3, f64, f64)> + Clone {
+        let (w, h) = (self.width as usize, self.height as usize);
+        let inside = self.texels[w..w * (h + 1)].iter().enumerate();
+        inside.map(move |(i, texel)| {
+            let turns = ((i % w) as f64 + 0.5) / w as f64 - f64::from(self.rotation);
+            let (sin_phi, cos_phi) = (2.0 * PI * turns).sin_cos();
+            let step = PI / h as f64;
+            let (sine, cosine) = (step * ((i / w) as f64 + 0.5)).sin_cos();
+            let radiance = texel[..3].iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
+            let angle = 2.0 * PI / w as f64 * 2.0 * (0.5 * step).sin() * sine;
+            (DVec3::new(-sine * cos_phi, cosine, -sine * sin_phi), radiance, angle)
+        })
     }
 
     /// Mean over all directions and channels, nits.

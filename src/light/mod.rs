@@ -1,5 +1,8 @@
 //! Punctual lights (`KHR_lights_punctual`) and environments. Emissive surfaces are materials.
 
+pub mod bounds;
+pub mod choice;
+pub mod element;
 pub mod environment;
 pub mod studio;
 pub mod table;

@@ -1,41 +1,34 @@
-//! Choosing a light and a point on it, for next event estimation.
+//! The lights of a scene: choosing one and a point on it, for next event estimation, and the density of that choice.
 //!
-//! Emissive triangles, punctual lights and the environment share one list; one is chosen with probability proportional to its power,
-//! by inverting the distribution function (not an alias table, which would undo the stratification of the number).
+//! A glowing mesh is one light, however many triangles it has; a triangle of it is chosen in proportion to its power. By
+//! inverting distribution functions throughout (not by alias tables, which would undo the stratification of the numbers).
 
+use super::bounds::Bounds;
+use super::choice::{Candidates, Choice, Receiver, Sky};
+use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
 use crate::material::table::MaterialTable;
-use crate::math::{UvSets, V3, distribution, robust};
+use crate::math::{V3, distribution};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
+use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
 
-const RECORDS: u32 = 6;
-const TRIANGLE: u32 = 0;
-const POINT: u32 = 1;
-const SPOT: u32 = 2;
-const DIRECTIONAL: u32 = 3;
-const ENVIRONMENT: u32 = 4;
-
-/// A light in the prepared scene's space.
-#[derive(Clone, Copy, Debug)]
+/// A light in the prepared scene's space. Its radiance, intensity or illuminance is above 0 and finite.
+#[derive(Clone, Debug)]
 pub enum PreparedLight {
-    /// An emissive triangle.
-    Triangle {
-        /// Corners, metres.
-        corners: [glam::Vec3; 3],
-        /// Unit normal of the front.
-        ng: glam::Vec3,
-        /// Square metres.
-        area: f64,
-        /// Its index among all triangles.
-        primitive: u32,
+    /// A glowing mesh where it is placed.
+    Mesh {
+        /// At least one.
+        triangles: Vec<LampTriangle>,
+        /// Mean over channels and the surface, nits.
+        radiance: f64,
+        /// Whether it shines on both sides.
+        both_sides: bool,
         /// Material index; emission is looked up there.
         material: u32,
-        /// Attribute index or [`NONE`].
-        attributes: u32,
     },
-    /// A point light, or a spot light about `axis`.
+    /// A point light, or a spot light about an axis.
     Point {
         /// Metres.
         position: glam::Vec3,
@@ -53,132 +46,142 @@ pub enum PreparedLight {
     },
 }
 
-/// The lights of a scene with their selection probabilities.
-///
-/// | record | x, y, z | w |
-/// |---|---|---|
-/// | 0 | corner, position or direction towards the light | kind |
-/// | 1 | edge 1, or the spot's axis | pmf |
-/// | 2 | edge 2, or the spot's scale and outer cosine | pmf / area |
-/// | 3 | intensity or illuminance | material |
-/// | 4 | unit normal | offset length |
-/// | 5 | attributes | - |
-#[derive(Clone, Debug, Default)]
-pub struct LightTable {
-    records: Vec<[f32; 4]>,
-    /// Upper ends of the lights' shares of [0, 1).
-    distribution: Vec<f32>,
-    has_triangles: bool,
-    has_punctual: bool,
-    /// With its selection probability; chosen as the last light of the list.
-    environment: Option<(EnvironmentTable, f32)>,
+/// What of the scene lights are read from.
+#[derive(Clone, Copy)]
+pub struct Sources<'a> {
+    /// Attributes of emissive triangles.
+    pub triangles: &'a TriangleTable,
+    /// Their emission.
+    pub materials: &'a MaterialTable,
+    /// Its textures.
+    pub textures: &'a TextureTable,
 }
 
-/// A point on a light seen from a shading point.
-pub struct LightSample<L: Lanes> {
-    /// Radiance of an area light, nits; intensity / distance^2 or illuminance of the others, lux.
-    pub radiance: V3<L>,
-    /// Unit, towards the light.
-    pub wi: V3<L>,
-    /// 1/sr with the selection pmf in it; the pmf alone for delta lights.
-    pub pdf: L::F,
-    /// Light without size: no BSDF sample can hit it.
-    pub is_delta: L::M,
-    /// Where the shadow ray ends, already off the light's surface; the direction itself for directional lights.
-    pub end: V3<L>,
-    /// Lanes whose light is infinitely far.
-    pub is_distant: L::M,
-    /// Lanes that receive anything.
-    pub valid: L::M,
+/// The lights of a scene, in the order of their numbers: those with a place, then suns, then the environment.
+#[derive(Clone, Debug, Default)]
+pub struct LightTable {
+    /// [`element::RECORDS`] each, those of a light together.
+    elements: Vec<[f32; 4]>,
+    /// A light's first element, the first of its `ends`, how many these are, and the density of a point on it given that
+    /// it is chosen, 1/m^2.
+    lights: Vec<[f32; 4]>,
+    /// Upper ends of the triangles' shares of their light, a table a mesh.
+    ends: Vec<f32>,
+    /// The largest table.
+    most_ends: u32,
+    emissive_meshes: usize,
+    emissive_triangles: usize,
+    has_punctual: bool,
+    environment: Option<EnvironmentTable>,
+    samples_environment: bool,
+    /// How one is chosen; `None` for a single light.
+    choice: Option<Choice>,
 }
 
 impl LightTable {
-    /// Lights with their powers (any common unit); those without power must not be in the list. Also sets the light
-    /// density of emissive triangles in `triangles`.
+    /// Of a scene of `radius` metres. Also tells the triangles of glowing meshes in `triangles` which light they are of.
     pub fn new(
-        lights: &[(PreparedLight, f64)],
-        environment: Option<(EnvironmentTable, f64)>,
+        mut lights: Vec<PreparedLight>,
+        environment: Option<EnvironmentTable>,
+        radius: f64,
         triangles: &mut TriangleTable,
     ) -> Self {
-        let mut powers: Vec<f64> = lights.iter().map(|l| l.1).collect();
-        powers.extend(environment.as_ref().map(|e| e.1));
-        let total: f64 = powers.iter().sum();
+        // Stable: surfaces, points, suns.
+        lights.sort_by_key(|light| match light {
+            PreparedLight::Mesh { .. } => 0,
+            PreparedLight::Point { .. } => 1,
+            PreparedLight::Directional { .. } => 2,
+        });
         let mut table = Self::default();
-        for (light, power) in lights {
-            table.push(light, power / total, triangles);
+        // An environment that is the same all around is left to scattered rays, which find it wherever they go.
+        let sky = environment.as_ref().and_then(|environment| Sky::new(environment.samples()));
+        table.samples_environment = sky.is_some();
+        let count = lights.len() + usize::from(sky.is_some());
+        let mut order: Vec<u32> = (0..lights.len() as u32).collect();
+        if count > 1 {
+            let (choice, placed) = Choice::new(candidates(&lights, sky, radius));
+            order[..placed.len()].copy_from_slice(&placed);
+            table.choice = Some(choice);
         }
-        if let Some((environment, power)) = environment {
-            let pmf = (power / total) as f32;
-            let mut first = [[0.0; 4]; RECORDS as usize];
-            first[0][3] = f32::from_bits(ENVIRONMENT);
-            table.records.extend(first);
-            table.environment = Some((environment, pmf));
+        for light in order {
+            table.push(&lights[light as usize], triangles);
         }
-        distribution::push_ends(&powers, &mut table.distribution);
+        if table.samples_environment {
+            table.push_element(0, 0, 0.0, element::environment());
+        }
+        table.environment = environment;
         table
     }
 
-    fn push(&mut self, light: &PreparedLight, pmf: f64, triangles: &mut TriangleTable) {
-        let record = |v: glam::Vec3, w: f32| [v.x, v.y, v.z, w];
-        let kind = f32::from_bits;
-        let (zero, pmf32) = (glam::Vec3::ZERO, pmf as f32);
-        match *light {
-            PreparedLight::Triangle { corners, ng, area, primitive, material, attributes } => {
-                let density = (pmf / area) as f32;
-                triangles.set_light_density(primitive as usize, density);
-                let max_abs = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
-                self.records.extend([
-                    record(corners[0], kind(TRIANGLE)),
-                    record(corners[1] - corners[0], pmf32),
-                    record(corners[2] - corners[0], density),
-                    record(zero, f32::from_bits(material)),
-                    record(ng, ng.abs().element_sum() * max_abs.max_element() * robust::gamma(16)),
-                    [f32::from_bits(attributes), 0.0, 0.0, 0.0],
-                ]);
-                self.has_triangles = true;
+    fn push(&mut self, light: &PreparedLight, triangles: &mut TriangleTable) {
+        match light {
+            PreparedLight::Mesh { triangles: lamps, material, .. } => {
+                let number = self.lights.len() as u32;
+                let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
+                let first_end = self.ends.len();
+                distribution::push_ends(&areas, &mut self.ends);
+                let ends = self.ends.len() - first_end;
+                self.most_ends = self.most_ends.max(ends as u32);
+                let density = 1.0 / areas.iter().sum::<f64>();
+                for (i, lamp) in lamps.iter().enumerate() {
+                    triangles.set_light(lamp.primitive as usize, number);
+                    let records = element::triangle(lamp, *material);
+                    if i == 0 {
+                        self.push_element(first_end as u32, ends as u32, density, records);
+                    } else {
+                        self.elements.extend(records);
+                    }
+                }
+                self.emissive_meshes += 1;
+                self.emissive_triangles += lamps.len();
             }
-            PreparedLight::Point { position, intensity, cone } => {
-                // KHR_lights_punctual: attenuation = clamp((cos - cos outer) / (cos inner - cos outer))^2. Its sample code
-                // takes at least 0.001 for the difference, which would dim narrow cones inside the inner angle.
-                let (axis, scale, outer) = cone
-                    .map_or((zero, 0.0, 1.0), |(axis, inner, outer)| (axis, 1.0 / (inner - outer).max(1e-6), outer));
-                self.records.extend([
-                    record(position, kind(if cone.is_some() { SPOT } else { POINT })),
-                    record(axis, pmf32),
-                    [scale, outer, 0.0, 0.0],
-                    record(glam::Vec3::from_array(intensity), 0.0),
-                    [0.0; 4],
-                    [0.0; 4],
-                ]);
+            &PreparedLight::Point { position, intensity, cone } => {
+                self.push_element(0, 0, 0.0, element::point(position, intensity, cone));
                 self.has_punctual = true;
             }
-            PreparedLight::Directional { towards, illuminance } => {
-                self.records.extend([
-                    record(towards, kind(DIRECTIONAL)),
-                    record(zero, pmf32),
-                    [0.0; 4],
-                    record(glam::Vec3::from_array(illuminance), 0.0),
-                    [0.0; 4],
-                    [0.0; 4],
-                ]);
+            &PreparedLight::Directional { towards, illuminance } => {
+                self.push_element(0, 0, 0.0, element::directional(towards, illuminance));
                 self.has_punctual = true;
             }
         }
     }
 
-    /// No light at all.
-    pub fn is_empty(&self) -> bool {
-        self.records.is_empty()
+    /// A light whose first element has these `records`.
+    fn push_element(
+        &mut self,
+        first_end: u32,
+        ends: u32,
+        density: f64,
+        records: [[f32; 4]; element::RECORDS as usize],
+    ) {
+        let first = (self.elements.len() / element::RECORDS as usize) as u32;
+        self.lights.push([f32::from_bits(first), f32::from_bits(first_end), f32::from_bits(ends), density as f32]);
+        self.elements.extend(records);
     }
 
-    /// Lights.
+    /// No light that is sampled.
+    pub fn is_empty(&self) -> bool {
+        self.lights.is_empty()
+    }
+
+    /// Lights, a glowing mesh being one; with the environment, sampled or not.
     pub fn len(&self) -> usize {
-        self.records.len() / RECORDS as usize
+        self.lights.len() + usize::from(self.has_environment() && !self.samples_environment)
+    }
+
+    /// Glowing meshes.
+    pub fn emissive_meshes(&self) -> usize {
+        self.emissive_meshes
+    }
+
+    /// Their triangles.
+    pub fn emissive_triangles(&self) -> usize {
+        self.emissive_triangles
     }
 
     /// Some light can be hit by a ray.
     pub fn has_triangles(&self) -> bool {
-        self.has_triangles
+        self.emissive_triangles > 0
     }
 
     /// There is light from all around.
@@ -186,171 +189,119 @@ impl LightTable {
         self.environment.is_some()
     }
 
-    /// What comes from infinitely far along the unit direction `d`: radiance (nits) and the density (1/sr, selection pmf
-    /// included) with which [`Self::sample`] would have chosen it. Nothing without an environment.
+    /// Whether the probability of a light depends on the point that it lights.
+    pub fn has_choice(&self) -> bool {
+        self.choice.is_some()
+    }
+
+    /// Numbers of f32 that [`Self::sample`] needs beside it.
+    pub fn scratch(&self) -> usize {
+        self.choice.as_ref().map_or(0, Choice::scratch)
+    }
+
+    /// Points `p` on flat opaque surfaces with the unit normals `n`.
+    #[inline(always)]
+    pub fn receiver<L: Lanes>(&self, p: V3<L>, n: V3<L>) -> Receiver<L> {
+        Receiver { p, n, both_sides: L::M::from_bits(0), least: L::F::zero() }
+    }
+
+    /// Density (1/m^2) of a point on the surfaces `light`, given that they are chosen; 0 for [`NONE`].
+    #[inline(always)]
+    pub fn density<L: Lanes>(&self, light: L::U) -> L::F {
+        let is_light = !light.eq(L::U::splat(NONE));
+        if !is_light.any() {
+            return L::F::zero();
+        }
+        light.records(&self.lights)[3].masked(is_light)
+    }
+
+    /// Probability with which [`Self::sample`] chooses the surfaces `light` (not [`NONE`]) from the receivers and sums of
+    /// `from`: `None` in scenes without a choice.
+    #[inline(always)]
+    pub fn pmf<L: Lanes>(&self, light: L::U, from: Option<(Receiver<L>, L::F)>) -> L::F {
+        match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf(light, &at, total),
+            _ => L::F::one(),
+        }
+    }
+
+    /// Probability with which [`Self::sample`] chooses the environment from the receivers and sums of `from`: `None` in
+    /// scenes without a choice.
+    #[inline(always)]
+    pub fn pmf_of_environment<L: Lanes>(&self, from: Option<(Receiver<L>, L::F)>) -> L::F {
+        match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf_of_sky(&at, total),
+            _ => L::F::splat(if self.samples_environment { 1.0 } else { 0.0 }),
+        }
+    }
+
+    /// What comes from infinitely far along the unit direction `d`: radiance (nits) and the density (1/sr) with which the
+    /// environment is sampled there, once chosen. Nothing without an environment.
     #[inline(always)]
     pub fn environment<L: Lanes>(&self, d: V3<L>) -> (V3<L>, L::F) {
-        let Some((environment, pmf)) = &self.environment else { return (V3::zero(), L::F::zero()) };
-        let (radiance, pdf) = environment.lookup::<L>(d);
-        (radiance, pdf * L::F::splat(*pmf))
+        let Some(environment) = &self.environment else { return (V3::zero(), L::F::zero()) };
+        environment.lookup::<L>(d)
     }
 
-    /// The index of the light whose share of [0, 1) holds `u`; no work for a single light.
-    #[inline(always)]
-    fn choose<L: Lanes>(&self, u: L::F) -> L::U {
-        distribution::find::<L>(&self.distribution, L::U::splat(0), self.distribution.len() as u32, u)
-    }
-
-    /// A light and a point on it, as seen from `p`, by `u` = (choice, point, point). The table must not be empty.
+    /// A light and a point on it, as seen from `at`, by `u` = (choice, point, point, triangle). The table must not be
+    /// empty.
     #[inline(always)]
     pub fn sample<L: Lanes>(
         &self,
-        p: V3<L>,
-        u: [L::F; 3],
-        triangles: &TriangleTable,
-        materials: &MaterialTable,
-        textures: &TextureTable,
+        at: &Receiver<L>,
+        u: [L::F; 4],
+        sources: Sources<'_>,
+        scratch: &mut [f32],
     ) -> LightSample<L> {
-        L::outline(Sample { lights: self, p, u, triangles, materials, textures })
-    }
-
-    #[inline(always)]
-    fn sample_any<L: Lanes>(&self, sample: Sample<'_, L>) -> LightSample<L> {
-        let Sample { p, u, triangles, materials, textures, .. } = sample;
-        let at = self.choose::<L>(u[0]) * L::U::splat(RECORDS);
-        let record = [
-            at.records(&self.records),
-            (at + L::U::splat(1)).records(&self.records),
-            (at + L::U::splat(2)).records(&self.records),
-            (at + L::U::splat(3)).records(&self.records),
-        ];
-        let kind = record[0][3].to_bits();
-        let Some((environment, pmf)) = &self.environment else {
-            return self.sample_near(p, u, at, &record, kind, triangles, materials, textures);
-        };
-        let far = kind.eq(L::U::splat(ENVIRONMENT));
-        let sky = sample_environment(environment, *pmf, [u[1], u[2]]);
-        if !self.has_triangles && !self.has_punctual {
-            return sky;
-        }
-        let near = self.sample_near(p, u, at, &record, kind, triangles, materials, textures);
-        LightSample {
-            radiance: sky.radiance.or_else(far, near.radiance),
-            wi: sky.wi.or_else(far, near.wi),
-            pdf: sky.pdf.or_else(far, near.pdf),
-            is_delta: near.is_delta & !far,
-            end: sky.end.or_else(far, near.end),
-            is_distant: near.is_distant | far,
-            valid: (sky.valid & far) | (near.valid & !far),
-        }
-    }
-
-    /// The lights other than the environment.
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "tables are passed apart so that light does not know the integrator")]
-    fn sample_near<L: Lanes>(
-        &self,
-        p: V3<L>,
-        u: [L::F; 3],
-        at: L::U,
-        record: &[[L::F; 4]; 4],
-        kind: L::U,
-        triangles: &TriangleTable,
-        materials: &MaterialTable,
-        textures: &TextureTable,
-    ) -> LightSample<L> {
-        let on_triangle = kind.eq(L::U::splat(TRIANGLE));
-        if !self.has_punctual {
-            return self.sample_triangle(p, u, at, record, triangles, materials, textures);
-        }
-        let punctual = sample_punctual(p, record, kind);
-        if !self.has_triangles || !on_triangle.any() {
-            return punctual;
-        }
-        let area = self.sample_triangle(p, u, at, record, triangles, materials, textures);
-        LightSample {
-            radiance: area.radiance.or_else(on_triangle, punctual.radiance),
-            wi: area.wi.or_else(on_triangle, punctual.wi),
-            pdf: area.pdf.or_else(on_triangle, punctual.pdf),
-            is_delta: !on_triangle,
-            end: area.end.or_else(on_triangle, punctual.end),
-            is_distant: punctual.is_distant & !on_triangle,
-            valid: (area.valid & on_triangle) | (punctual.valid & !on_triangle),
-        }
-    }
-
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "tables are passed apart so that light does not know the integrator")]
-    fn sample_triangle<L: Lanes>(
-        &self,
-        p: V3<L>,
-        u: [L::F; 3],
-        at: L::U,
-        record: &[[L::F; 4]; 4],
-        triangles: &TriangleTable,
-        materials: &MaterialTable,
-        textures: &TextureTable,
-    ) -> LightSample<L> {
-        let normal = (at + L::U::splat(4)).records(&self.records);
-        let xyz = xyz::<L>;
-        let ng = xyz(&normal);
-        // Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square".
-        let half = L::F::splat(0.5);
-        let upper = u[2].gt(u[1]);
-        let small = u[1].min(u[2]) * half;
-        let b1 = small.or_else(upper, u[1] - small);
-        let b2 = (u[2] - small).or_else(upper, small);
-        let point = xyz(&record[2]).mul_add(b2, xyz(&record[1]).mul_add(b1, xyz(&record[0])));
-        let to_light = point - p;
-        let distance2 = to_light.dot(to_light);
-        let wi = to_light.scale(L::F::one() / distance2.sqrt());
-        let cos = -wi.dot(ng);
-        let front = cos.gt(L::F::zero());
-        let pdf = record[2][3] * distance2 / cos.abs();
-        // Off the light's surface, on the side that is seen.
-        let side = L::F::one().or_else(front, -L::F::one());
-        let end = robust::offset_point(point, ng.scale(side), normal[3]);
-        let mut uvs = UvSets::single(L::F::zero(), L::F::zero());
-        let mut vertex_opacity = L::F::one();
-        if triangles.has_attributes() {
-            let attributes = (at + L::U::splat(5)).records(&self.records)[0].to_bits();
-            if (!attributes.eq(L::U::splat(NONE))).any() {
-                let a = triangles.attributes::<L>(attributes, b1, b2);
-                (uvs, vertex_opacity) = (a.uvs, a.opacity);
+        let (light, pmf, total) = match &self.choice {
+            Some(choice) => {
+                let chosen = choice.choose(at, u[0], scratch);
+                (chosen.light, chosen.pmf, chosen.total)
             }
-        }
-        let finite = pdf.is_finite() & pdf.gt(L::F::zero());
-        let material = record[3][3].to_bits();
-        let mut radiance: V3<L> = materials.emission(textures, material, front, &uvs, finite);
-        if materials.has_coat() {
-            radiance =
-                radiance.scale(materials.emission_through_coat::<L>(textures, material, cos.abs(), &uvs, finite));
-        }
-        if materials.has_alpha() {
-            // The ray ends before the light's own surface, so what of it is not there is taken off here.
-            radiance = radiance.scale(materials.coverage(textures, material, &uvs, vertex_opacity, finite));
-        }
-        LightSample {
-            radiance,
-            wi,
-            pdf,
-            is_delta: L::M::from_bits(0),
-            end,
-            is_distant: L::M::from_bits(0),
-            valid: finite & radiance.max_component().gt(L::F::zero()),
-        }
+            None => (L::U::splat(0), L::F::one(), L::F::zero()),
+        };
+        let sample = L::outline(Sample { lights: self, light, pmf, p: at.p, u, sources });
+        LightSample { total, ..sample }
     }
 }
 
-/// A direction of the environment.
-/// [`LightTable::sample`].
+/// How `lights` look from afar.
+fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candidates {
+    let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+    let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, suns: Vec::new(), sky, radius };
+    for light in lights {
+        match light {
+            PreparedLight::Mesh { triangles, radiance, both_sides, .. } => {
+                let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.corners.map(|c| c.as_dvec3())).collect();
+                candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides));
+                candidates.surfaces += 1;
+            }
+            &PreparedLight::Point { position, intensity, cone } => {
+                let (position, intensity) = (position.as_dvec3(), mean(intensity));
+                candidates.placed.push(match cone {
+                    Some((axis, inner, outer)) => {
+                        let (inner, outer) = (f64::from(inner), f64::from(outer));
+                        Bounds::of_spot(position, intensity, axis.as_dvec3(), inner, outer)
+                    }
+                    None => Bounds::of_point(position, intensity),
+                });
+            }
+            &PreparedLight::Directional { towards, illuminance } => {
+                candidates.suns.push((towards.as_dvec3(), mean(illuminance)));
+            }
+        }
+    }
+    candidates
+}
+
+/// [`LightTable::sample`], the light being chosen.
 struct Sample<'a, L: Lanes> {
     lights: &'a LightTable,
+    light: L::U,
+    pmf: L::F,
     p: V3<L>,
-    u: [L::F; 3],
-    triangles: &'a TriangleTable,
-    materials: &'a MaterialTable,
-    textures: &'a TextureTable,
+    u: [L::F; 4],
+    sources: Sources<'a>,
 }
 
 impl<L: Lanes> Part<L> for Sample<'_, L> {
@@ -358,51 +309,59 @@ impl<L: Lanes> Part<L> for Sample<'_, L> {
 
     #[inline(always)]
     fn run(self) -> LightSample<L> {
-        self.lights.sample_any(self)
+        let Self { lights, light, pmf, p, u, sources } = self;
+        let record = light.records(&lights.lights);
+        let mut index = record[0].to_bits();
+        if lights.most_ends > 1 {
+            let (first, count) = (record[1].to_bits(), record[2].to_bits());
+            index = index + distribution::find_each::<L>(&lights.ends, first, count, lights.most_ends, u[3]);
+        }
+        let element = Element::<L>::load(&lights.elements, index, pmf, record[3]);
+        let Some(environment) = lights.environment.as_ref().filter(|_| lights.samples_environment) else {
+            return lights.sample_near(&element, p, [u[1], u[2]], &sources);
+        };
+        let far = element.is_environment();
+        let sky = sample_environment(environment, pmf, [u[1], u[2]]);
+        if !lights.has_triangles() && !lights.has_punctual {
+            return sky;
+        }
+        merged(far, sky, lights.sample_near(&element, p, [u[1], u[2]], &sources))
     }
 }
 
+impl LightTable {
+    /// The lights other than the environment.
+    #[inline(always)]
+    fn sample_near<L: Lanes>(
+        &self,
+        element: &Element<L>,
+        p: V3<L>,
+        u: [L::F; 2],
+        sources: &Sources<'_>,
+    ) -> LightSample<L> {
+        if !self.has_punctual {
+            return element.sample_triangle(&self.elements, p, u, sources);
+        }
+        let punctual = element.sample_punctual(p);
+        let on_triangle = element.is_triangle();
+        if !self.has_triangles() || !on_triangle.any() {
+            return punctual;
+        }
+        merged(on_triangle, element.sample_triangle(&self.elements, p, u, sources), punctual)
+    }
+}
+
+/// `a` in `lanes`, else `b`.
 #[inline(always)]
-fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: f32, u: [L::F; 2]) -> LightSample<L> {
-    let sample = environment.sample::<L>(u);
-    let pdf = sample.pdf * L::F::splat(pmf);
+fn merged<L: Lanes>(lanes: L::M, a: LightSample<L>, b: LightSample<L>) -> LightSample<L> {
     LightSample {
-        radiance: sample.radiance,
-        wi: sample.direction,
-        pdf,
-        is_delta: L::M::from_bits(0),
-        end: sample.direction,
-        is_distant: L::M::first(L::N),
-        valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
+        radiance: a.radiance.or_else(lanes, b.radiance),
+        wi: a.wi.or_else(lanes, b.wi),
+        pdf: a.pdf.or_else(lanes, b.pdf),
+        is_delta: (a.is_delta & lanes) | (b.is_delta & !lanes),
+        end: a.end.or_else(lanes, b.end),
+        is_distant: (a.is_distant & lanes) | (b.is_distant & !lanes),
+        valid: (a.valid & lanes) | (b.valid & !lanes),
+        total: a.total.or_else(lanes, b.total),
     }
-}
-
-/// The point, spot and directional lights of `record`.
-#[inline(always)]
-fn sample_punctual<L: Lanes>(p: V3<L>, record: &[[L::F; 4]; 4], kind: L::U) -> LightSample<L> {
-    let (zero, one) = (L::F::zero(), L::F::one());
-    let place = xyz::<L>(&record[0]);
-    let is_distant = kind.eq(L::U::splat(DIRECTIONAL));
-    let to_light = place - p;
-    let distance2 = to_light.dot(to_light);
-    let wi = place.or_else(is_distant, to_light.scale(one / distance2.sqrt()));
-    let cos = -(xyz::<L>(&record[1]).dot(wi));
-    let falloff = ((cos - record[2][1]) * record[2][0]).max(zero).min(one);
-    let attenuation = (falloff * falloff).or_else(kind.eq(L::U::splat(SPOT)), one);
-    let scale = one.or_else(is_distant, attenuation / distance2);
-    let radiance = xyz::<L>(&record[3]).scale(scale);
-    LightSample {
-        radiance,
-        wi,
-        pdf: record[1][3],
-        is_delta: L::M::first(L::N),
-        end: place,
-        is_distant,
-        valid: radiance.is_finite() & wi.is_finite() & radiance.max_component().gt(zero),
-    }
-}
-
-#[inline(always)]
-fn xyz<L: Lanes>(record: &[L::F; 4]) -> V3<L> {
-    V3::new(record[0], record[1], record[2])
 }

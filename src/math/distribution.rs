@@ -33,6 +33,20 @@ pub fn find<L: Lanes>(ends: &[f32], first: L::U, count: u32, u: L::F) -> L::U {
     at
 }
 
+/// [`find`] in tables of `counts` ends (powers of two, at most `most`).
+#[inline(always)]
+pub fn find_each<L: Lanes>(ends: &[f32], first: L::U, counts: L::U, most: u32, u: L::F) -> L::U {
+    let mut at = L::U::splat(0);
+    let mut step = most / 2;
+    while step > 0 {
+        let by = L::U::splat(step);
+        let end = (first + at + L::U::splat(step - 1)).gather(ends);
+        at = (at + by).or_else(by.lt(counts) & u.ge(end), at);
+        step /= 2;
+    }
+    at
+}
+
 /// [`find`], and where in the entry's share `u` lies, in [0, 1): a number that can be used again.
 #[inline(always)]
 pub fn find_within<L: Lanes>(ends: &[f32], first: L::U, count: u32, u: L::F) -> (L::U, L::F) {

@@ -10,7 +10,7 @@ use crate::accel::front::{MOST, MOST_TWICE};
 use crate::accel::geometry::{Affine, Placement};
 use crate::accel::wide::{MOST_SPLITS, may_split};
 use crate::film::BLOCKS;
-use crate::light::{studio, table::PreparedLight};
+use crate::light::{element::LampTriangle, studio};
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
 use crate::shape::placement::PlacementTable;
@@ -179,8 +179,10 @@ const PLACEMENT: u64 = PlacementTable::BYTES as u64;
 const PLACEMENT_BUILDING: u64 = (size_of::<Placement>() + size_of::<Affine>() + 16) as u64;
 /// An instance while it is decided what is placed.
 const INSTANCE_CONSIDERED: u64 = 16;
-/// A light in `light::table`: six records and the end of its share.
-const LIGHT: u64 = 6 * 16 + 4;
+/// An element in `light::table` (five records, the end of its share), and what a choice knows of a light: two nodes of
+/// four records at most, and a record of its own.
+const LIGHT: u64 = 5 * 16 + 4;
+const CHOICE: u64 = (2 * 4 + 1) * 16;
 /// A texel of an environment: record and the end of its share.
 const ENVIRONMENT_TEXEL: u64 = 16 + 4;
 /// A texel of the map that it was made from, which stays.
@@ -191,6 +193,7 @@ impl Machinery {
         let emits: Vec<bool> =
             (scene.materials.iter()).map(|m| !m.unlit && m.emission.factor.iter().any(|&e| e > 0.0)).collect();
         let (mut vertices, mut triangles, mut lights, mut records, mut largest) = (0_u64, 0_u64, 0_u64, 0_u64, 0_u64);
+        let mut choices = 0_u64;
         let placing = Placing::of_scene(scene);
         let merged = scene.instances.iter().zip(&placing.is_merged).filter(|(_, is_merged)| **is_merged);
         let placed = placing.things.iter().flat_map(|thing| &thing.meshes);
@@ -203,9 +206,11 @@ impl Machinery {
             records += n * bytes_per_triangle(mesh);
             if emits.get(mesh.material.index()) == Some(&true) {
                 lights += n;
+                choices += 1;
             }
         }
         lights += scene.lights.len() as u64;
+        choices += scene.lights.len() as u64;
         let texels: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
         let levels = Levels::of(scene, settings);
         let environment = match &scene.environment {
@@ -221,9 +226,9 @@ impl Machinery {
             0
         };
         let accel = accel(vertices, [triangles, most_splits], placements, settings.accel);
-        let list = lights * (size_of::<(PreparedLight, f64)>() as u64 + 8);
+        let list = lights * (size_of::<LampTriangle>() as u64 + 72 + 8);
         Self {
-            held: records + texels + levels.held + environment + lights * LIGHT + placements * PLACEMENT + accel.held,
+            held: records + texels + levels.held + environment + lights * LIGHT + choices * CHOICE + placements * PLACEMENT + accel.held,
             building: geometry
                 + levels.building
                 + (12 * largest).max(list)

@@ -13,6 +13,7 @@ use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables, Spectrum};
 use crate::light::environment::EnvironmentTable;
+use crate::light::element::LampTriangle;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::media::MediumTable;
@@ -218,14 +219,14 @@ fn prepare_all(
     }
     warnings.extend(losses.iter().cloned());
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
-    punctual(scene, origin, radius, &mut lights);
+    punctual(scene, origin, &mut lights);
     let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
-    let environment = environment(scene, default_light.used, radius, &lights);
+    let environment = environment(scene, default_light.used);
     if lights.is_empty() && environment.is_none() {
         warnings.push(default_light.darkness(scene));
     }
     warnings.extend(refraction::lights_that_glass_hides(scene));
-    let lights = LightTable::new(&lights, environment, &mut triangles);
+    let lights = LightTable::new(lights, environment, radius, &mut triangles);
     let media = MediumTable::new(&scene.materials);
     let spectrum = media.has_dispersion().then(Spectrum::default);
     let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
@@ -289,25 +290,10 @@ fn add_surface(scene: &Scene, thing: &Thing, emissions: &[[f64; 3]], surface: &m
     }
 }
 
-/// Most that the environment takes of the light samples where there are other lights: scattered rays find it by
-/// themselves, other lights need the samples.
-const ENVIRONMENT_SHARE: f64 = 0.5;
-
-/// The environment with the weight of its choice: its power through the scene's bounding sphere, limited.
-fn environment(
-    scene: &Scene,
-    studio: bool,
-    radius: f64,
-    others: &[(PreparedLight, f64)],
-) -> Option<(EnvironmentTable, f64)> {
+/// The environment: the scene's own, or the studio if that is to light it.
+fn environment(scene: &Scene, studio: bool) -> Option<EnvironmentTable> {
     let own = scene.environment.as_ref().and_then(EnvironmentTable::new);
-    let table = own.or_else(|| studio.then(studio::environment).as_ref().and_then(EnvironmentTable::new))?;
-    let power = 4.0 * (std::f64::consts::PI * radius).powi(2) * table.mean_radiance();
-    let others: f64 = others.iter().map(|l| l.1).sum();
-    let most = others * ENVIRONMENT_SHARE / (1.0 - ENVIRONMENT_SHARE);
-    // Alone it is certain, whatever its power; a scene of a single point has no sphere.
-    let weight = if others > 0.0 { power.min(most) } else { 1.0 };
-    Some((table, weight))
+    own.or_else(|| studio.then(studio::environment).as_ref().and_then(EnvironmentTable::new))
 }
 
 /// Appends a mesh where `world_from_object` puts it, seen from `origin`; vertices are transformed in f64 and rounded
@@ -322,7 +308,7 @@ fn flatten(
     opacities: &Opacities,
     parts: &mut Parts,
     table: &mut TriangleTable,
-    mut lights: Option<&mut Vec<(PreparedLight, f64)>>,
+    lights: Option<&mut Vec<PreparedLight>>,
     totals: &mut Totals,
 ) {
     let material = scene.materials.get(mesh.material.index());
@@ -344,9 +330,9 @@ fn flatten(
         normals.iter().map(world).collect()
     });
     let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
-    // Mean over channels: what its share of the light samples follows.
+    // Mean over channels: what light may be expected of it.
     let average = emission.iter().sum::<f64>() / 3.0;
-    let sides = if material.is_some_and(|m| m.double_sided) { 2.0 } else { 1.0 };
+    let mut lamps = Vec::new();
     let mut mesh_area = 0.0;
     let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
     for &[i, j, k] in &mesh.indices {
@@ -389,16 +375,16 @@ fn flatten(
         part.primitives.push(triangles.indices.len(), primitive);
         triangles.indices.push([i, j, k].map(|v| first + v));
         table.push(corners, ng, mesh.material.0, attributes, tangents);
-        if average > 0.0
-            && area > LEAST_SAMPLED_AREA
-            && let Some(lights) = &mut lights
-        {
-            let power = average * area * sides * std::f64::consts::PI;
-            let light = PreparedLight::Triangle { corners, ng, area, primitive, material: mesh.material.0, attributes };
-            lights.push((light, power));
+        if lights.is_some() && average > 0.0 && area > LEAST_SAMPLED_AREA {
+            lamps.push(LampTriangle { corners, ng, area, primitive, attributes });
         }
     }
-    if lights.is_some() {
+    if let Some(lights) = lights {
+        if !lamps.is_empty() {
+            let both_sides = material.is_some_and(|m| m.double_sided);
+            let material = mesh.material.0;
+            lights.push(PreparedLight::Mesh { triangles: lamps, radiance: average, both_sides, material });
+        }
         totals.surface.add(mesh_area, material, emission);
     }
 }
@@ -415,30 +401,25 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
 }
 
 /// Adds the punctual lights that shine at all.
-fn punctual(scene: &Scene, origin: DVec3, radius: f64, lights: &mut Vec<(PreparedLight, f64)>) {
-    use std::f64::consts::PI;
+fn punctual(scene: &Scene, origin: DVec3, lights: &mut Vec<PreparedLight>) {
     for placed in &scene.lights {
-        let place = placed.world_from_light.w_axis.truncate() - origin;
+        let position = (placed.world_from_light.w_axis.truncate() - origin).as_vec3();
         let axis = -placed.world_from_light.z_axis.truncate().normalize();
-        let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-        let position = place.as_vec3();
-        let (light, power) = match placed.light {
-            Light::Point { intensity } => {
-                (PreparedLight::Point { position, intensity, cone: None }, 4.0 * PI * mean(intensity))
-            }
+        let (light, color) = match placed.light {
+            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None }, intensity),
             Light::Spot { intensity, inner_cone, outer_cone } => {
                 let (inner, outer) = (f64::from(inner_cone).cos(), f64::from(outer_cone).cos());
                 let cone = Some((axis.as_vec3(), inner as f32, outer as f32));
-                let solid_angle = 2.0 * PI * (1.0 - 0.5 * (inner + outer));
-                (PreparedLight::Point { position, intensity, cone }, solid_angle * mean(intensity))
+                (PreparedLight::Point { position, intensity, cone }, intensity)
             }
-            Light::Directional { illuminance } => (
-                PreparedLight::Directional { towards: (-axis).as_vec3(), illuminance },
-                PI * radius * radius * mean(illuminance),
-            ),
+            Light::Directional { illuminance } => {
+                (PreparedLight::Directional { towards: (-axis).as_vec3(), illuminance }, illuminance)
+            }
         };
-        if power > 0.0 {
-            lights.push((light, power));
+        // Not for NaN either.
+        let sum: f32 = color.iter().sum();
+        if sum > 0.0 && sum.is_finite() {
+            lights.push(light);
         }
     }
 }

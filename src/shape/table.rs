@@ -33,7 +33,7 @@ pub struct Corners<'a> {
 /// | 0 | first corner, metres | material |
 /// | 1 | second corner - first | attributes or [`NONE`] |
 /// | 2 | third corner - first | tangents or [`NONE`] |
-/// | 3 | unit normal, counter-clockwise side | light density: selection pmf / area, 1/m^2; 0 = not a light |
+/// | 3 | unit normal, counter-clockwise side | number of the light that it is of, or [`NONE`] |
 #[derive(Clone, Debug, Default)]
 pub struct TriangleTable {
     records: Vec<[f32; 4]>,
@@ -67,8 +67,8 @@ pub struct Triangle<L: Lanes> {
     pub attributes: L::U,
     /// Tangent index or [`NONE`].
     pub tangents: L::U,
-    /// Selection pmf over area, 1/m^2; 0 where it is no light.
-    pub light_density: L::F,
+    /// Number of the light that it is of, or [`NONE`].
+    pub light: L::U,
 }
 
 /// Interpolated attributes, per lane.
@@ -100,7 +100,7 @@ impl TriangleTable {
         self.records.push(record(corners[0], material));
         self.records.push(record(corners[1] - corners[0], attributes));
         self.records.push(record(corners[2] - corners[0], tangents));
-        self.records.push(record(ng, 0));
+        self.records.push(record(ng, NONE));
     }
 
     /// Adds corner attributes and gives their index.
@@ -135,9 +135,9 @@ impl TriangleTable {
         (self.tangents.len() / 3 - 1) as u32
     }
 
-    /// Marks triangle `i` as a light with selection pmf over area `density`, 1/m^2.
-    pub fn set_light_density(&mut self, i: usize, density: f32) {
-        self.records[4 * i + 3][3] = density;
+    /// Marks triangle `i` as part of a light.
+    pub fn set_light(&mut self, i: usize, light: u32) {
+        self.records[4 * i + 3][3] = f32::from_bits(light);
     }
 
     /// Triangles.
@@ -187,7 +187,7 @@ impl TriangleTable {
             material: r0[3].to_bits(),
             attributes: r1[3].to_bits(),
             tangents: r2[3].to_bits(),
-            light_density: r3[3],
+            light: r3[3].to_bits(),
         }
     }
 

@@ -78,7 +78,7 @@ pub struct Seen {
     pub offset: f64,
     /// Bound of the point's error along each axis, metres.
     pub bound: DVec3,
-    /// Selection pmf over area, 1/m^2.
+    /// Of a point on its light, given that that is chosen, 1/m^2; 0 where it is of none.
     pub light_density: f64,
 }
 
@@ -142,7 +142,7 @@ pub fn read_placed(prepared: &Prepared, points: &[(u32, u32, f32, f32)]) -> Vec<
                     ns: normal.map_or(ng, DVec3::normalize_or_zero),
                     offset: get(offset),
                     bound,
-                    light_density: get(triangle.light_density),
+                    light_density: get(tables.lights.density::<L>(triangle.light)),
                 }
             };
             self.1.iter().map(one).collect()

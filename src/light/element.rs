@@ -1,0 +1,258 @@
+//! What light samples come from: triangles of glowing surfaces, punctual lights, the environment.
+
+use super::bounds::spot_scale;
+use super::environment::EnvironmentTable;
+use super::table::Sources;
+use crate::math::{UvSets, V3, robust};
+use crate::shape::table::NONE;
+use simd::{Float, Lanes, Mask, Uint};
+
+/// Records of an element.
+///
+/// | record | x, y, z | w |
+/// |---|---|---|
+/// | 0 | corner, position or direction towards the light | kind |
+/// | 1 | edge 1, or the spot's axis | attributes |
+/// | 2 | edge 2, or the spot's scale and outer cosine | - |
+/// | 3 | intensity or illuminance | material |
+/// | 4 | unit normal | offset length |
+pub const RECORDS: u32 = 5;
+const TRIANGLE: u32 = 0;
+const POINT: u32 = 1;
+const SPOT: u32 = 2;
+const DIRECTIONAL: u32 = 3;
+const ENVIRONMENT: u32 = 4;
+
+/// An emissive triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct LampTriangle {
+    /// Corners, metres.
+    pub corners: [glam::Vec3; 3],
+    /// Unit normal of the front.
+    pub ng: glam::Vec3,
+    /// Square metres.
+    pub area: f64,
+    /// Its index among all triangles.
+    pub primitive: u32,
+    /// Attribute index or [`NONE`].
+    pub attributes: u32,
+}
+
+/// A point on a light seen from a shading point.
+pub struct LightSample<L: Lanes> {
+    /// Radiance of an area light, nits; intensity / distance^2 or illuminance of the others, lux.
+    pub radiance: V3<L>,
+    /// Unit, towards the light.
+    pub wi: V3<L>,
+    /// 1/sr with the selection pmf in it; the pmf alone for delta lights.
+    pub pdf: L::F,
+    /// Light without size: no BSDF sample can hit it.
+    pub is_delta: L::M,
+    /// Where the shadow ray ends, already off the light's surface; the direction itself for directional lights.
+    pub end: V3<L>,
+    /// Lanes whose light is infinitely far.
+    pub is_distant: L::M,
+    /// Lanes that receive anything.
+    pub valid: L::M,
+    /// Importances of all lights together, see [`super::choice::Choice::pmf`].
+    pub total: L::F,
+}
+
+/// Chosen elements: their first four records, and where the fifth is.
+pub struct Element<L: Lanes> {
+    records: [[L::F; 4]; 4],
+    normal: L::U,
+    /// Selection pmf.
+    pub pmf: L::F,
+    /// Density of a point on it, given that the light is chosen, 1/m^2.
+    pub density: L::F,
+}
+
+fn record(v: glam::Vec3, w: u32) -> [f32; 4] {
+    [v.x, v.y, v.z, f32::from_bits(w)]
+}
+
+/// A triangle of a surface of `material`.
+pub fn triangle(lamp: &LampTriangle, material: u32) -> [[f32; 4]; RECORDS as usize] {
+    let LampTriangle { corners, ng, attributes, .. } = *lamp;
+    let max_abs = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
+    let offset = ng.abs().element_sum() * max_abs.max_element() * robust::gamma(16);
+    [
+        record(corners[0], TRIANGLE),
+        record(corners[1] - corners[0], attributes),
+        record(corners[2] - corners[0], 0),
+        record(glam::Vec3::ZERO, material),
+        record(ng, offset.to_bits()),
+    ]
+}
+
+/// A point light, or a spot light about an axis with the cosines of its inner and outer half angles.
+pub fn point(
+    position: glam::Vec3,
+    intensity: [f32; 3],
+    cone: Option<(glam::Vec3, f32, f32)>,
+) -> [[f32; 4]; RECORDS as usize] {
+    let spot = |(axis, inner, outer): (glam::Vec3, f32, f32)| {
+        (axis, spot_scale(f64::from(inner), f64::from(outer)) as f32, outer)
+    };
+    let (axis, scale, outer) = cone.map_or((glam::Vec3::ZERO, 0.0, 1.0), spot);
+    [
+        record(position, if cone.is_some() { SPOT } else { POINT }),
+        record(axis, NONE),
+        [scale, outer, 0.0, 0.0],
+        record(intensity.into(), 0),
+        [0.0; 4],
+    ]
+}
+
+/// Parallel light.
+pub fn directional(towards: glam::Vec3, illuminance: [f32; 3]) -> [[f32; 4]; RECORDS as usize] {
+    let zero = glam::Vec3::ZERO;
+    [record(towards, DIRECTIONAL), record(zero, NONE), [0.0; 4], record(illuminance.into(), 0), [0.0; 4]]
+}
+
+/// Stands for the environment.
+pub fn environment() -> [[f32; 4]; RECORDS as usize] {
+    let mut records = [[0.0; 4]; RECORDS as usize];
+    records[0][3] = f32::from_bits(ENVIRONMENT);
+    records
+}
+
+impl<L: Lanes> Element<L> {
+    /// Elements number `index`.
+    #[inline(always)]
+    pub fn load(elements: &[[f32; 4]], index: L::U, pmf: L::F, density: L::F) -> Self {
+        let at = index * L::U::splat(RECORDS);
+        let records = [
+            at.records(elements),
+            (at + L::U::splat(1)).records(elements),
+            (at + L::U::splat(2)).records(elements),
+            (at + L::U::splat(3)).records(elements),
+        ];
+        Self { records, normal: at + L::U::splat(4), pmf, density }
+    }
+
+    /// Lanes whose element is the environment.
+    #[inline(always)]
+    pub fn is_environment(&self) -> L::M {
+        self.records[0][3].to_bits().eq(L::U::splat(ENVIRONMENT))
+    }
+
+    /// Lanes whose element is a triangle.
+    #[inline(always)]
+    pub fn is_triangle(&self) -> L::M {
+        self.records[0][3].to_bits().eq(L::U::splat(TRIANGLE))
+    }
+
+    /// A point on the triangles, as seen from `p`.
+    #[inline(always)]
+    pub fn sample_triangle(
+        &self,
+        elements: &[[f32; 4]],
+        p: V3<L>,
+        u: [L::F; 2],
+        sources: &Sources<'_>,
+    ) -> LightSample<L> {
+        let Self { records, pmf, density, .. } = self;
+        let Sources { triangles, materials, textures } = *sources;
+        let normal = self.normal.records(elements);
+        let xyz = xyz::<L>;
+        let ng = xyz(&normal);
+        // Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square".
+        let half = L::F::splat(0.5);
+        let upper = u[1].gt(u[0]);
+        let small = u[0].min(u[1]) * half;
+        let b1 = small.or_else(upper, u[0] - small);
+        let b2 = (u[1] - small).or_else(upper, small);
+        let point = xyz(&records[2]).mul_add(b2, xyz(&records[1]).mul_add(b1, xyz(&records[0])));
+        let to_light = point - p;
+        let distance2 = to_light.dot(to_light);
+        let wi = to_light.scale(L::F::one() / distance2.sqrt());
+        let cos = -wi.dot(ng);
+        let front = cos.gt(L::F::zero());
+        let pdf = *pmf * *density * distance2 / cos.abs();
+        // Off the light's surface, on the side that is seen.
+        let side = L::F::one().or_else(front, -L::F::one());
+        let end = robust::offset_point(point, ng.scale(side), normal[3]);
+        let mut uvs = UvSets::single(L::F::zero(), L::F::zero());
+        let mut vertex_opacity = L::F::one();
+        if triangles.has_attributes() {
+            let attributes = records[1][3].to_bits();
+            if (!attributes.eq(L::U::splat(NONE))).any() {
+                let a = triangles.attributes::<L>(attributes, b1, b2);
+                (uvs, vertex_opacity) = (a.uvs, a.opacity);
+            }
+        }
+        let finite = pdf.is_finite() & pdf.gt(L::F::zero());
+        let material = records[3][3].to_bits();
+        let mut radiance: V3<L> = materials.emission(textures, material, front, &uvs, finite);
+        if materials.has_coat() {
+            radiance =
+                radiance.scale(materials.emission_through_coat::<L>(textures, material, cos.abs(), &uvs, finite));
+        }
+        if materials.has_alpha() {
+            // The ray ends before the light's own surface, so what of it is not there is taken off here.
+            radiance = radiance.scale(materials.coverage(textures, material, &uvs, vertex_opacity, finite));
+        }
+        LightSample {
+            radiance,
+            wi,
+            pdf,
+            is_delta: L::M::from_bits(0),
+            end,
+            is_distant: L::M::from_bits(0),
+            valid: finite & radiance.max_component().gt(L::F::zero()),
+            total: L::F::zero(),
+        }
+    }
+
+    /// The point, spot and directional lights.
+    #[inline(always)]
+    pub fn sample_punctual(&self, p: V3<L>) -> LightSample<L> {
+        let record = &self.records;
+        let kind = record[0][3].to_bits();
+        let (zero, one) = (L::F::zero(), L::F::one());
+        let place = xyz::<L>(&record[0]);
+        let is_distant = kind.eq(L::U::splat(DIRECTIONAL));
+        let to_light = place - p;
+        let distance2 = to_light.dot(to_light);
+        let wi = place.or_else(is_distant, to_light.scale(one / distance2.sqrt()));
+        let cos = -(xyz::<L>(&record[1]).dot(wi));
+        let falloff = ((cos - record[2][1]) * record[2][0]).max(zero).min(one);
+        let attenuation = (falloff * falloff).or_else(kind.eq(L::U::splat(SPOT)), one);
+        let scale = one.or_else(is_distant, attenuation / distance2);
+        let radiance = xyz::<L>(&record[3]).scale(scale);
+        LightSample {
+            radiance,
+            wi,
+            pdf: self.pmf,
+            is_delta: L::M::first(L::N),
+            end: place,
+            is_distant,
+            valid: radiance.is_finite() & wi.is_finite() & radiance.max_component().gt(zero) & self.pmf.gt(zero),
+            total: zero,
+        }
+    }
+}
+
+/// A direction of the environment.
+#[inline(always)]
+pub fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: L::F, u: [L::F; 2]) -> LightSample<L> {
+    let sample = environment.sample::<L>(u);
+    let pdf = sample.pdf * pmf;
+    LightSample {
+        radiance: sample.radiance,
+        wi: sample.direction,
+        pdf,
+        is_delta: L::M::from_bits(0),
+        end: sample.direction,
+        is_distant: L::M::first(L::N),
+        valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
+        total: L::F::zero(),
+    }
+}
+
+#[inline(always)]
+fn xyz<L: Lanes>(record: &[L::F; 4]) -> V3<L> {
+    V3::new(record[0], record[1], record[2])
+}
