@@ -7,6 +7,7 @@
 
 mod cut;
 mod importance;
+mod packed;
 mod sky;
 mod tree;
 
@@ -146,11 +147,10 @@ impl<L: Lanes> Part<L> for Choose<'_, L> {
         let mut total = zero;
         // Importances, one after the other.
         let mut n = 0;
-        let mut nodes = [L::U::splat(0); CUT];
+        let mut cut = None;
         if let Some(tree) = &choice.tree {
-            let cut = cut::cut(&tree.nodes, at);
-            nodes = cut.nodes;
-            for importance in cut.importance {
+            let nodes = cut.insert(cut::cut(&tree.nodes, at));
+            for importance in nodes.importance {
                 push::<L>(importance, scratch, &mut n, &mut total);
             }
         } else {
@@ -181,14 +181,16 @@ impl<L: Lanes> Part<L> for Choose<'_, L> {
         }
         let mut pmf = (importance / total).masked(total.gt(zero));
         let mut light = place;
-        if let Some(tree) = &choice.tree {
+        if let (Some(tree), Some(cut)) = (&choice.tree, &cut) {
             let in_tree = place.lt(L::U::splat(near as u32));
-            let mut node = nodes[0];
-            for (i, other) in nodes.iter().enumerate().skip(1) {
-                node = other.or_else(place.eq(L::U::splat(i as u32)), node);
+            let (mut node, mut right, mut first) = (cut.nodes[0], cut.rights[0], cut.firsts[0]);
+            for i in 1..CUT {
+                let here = place.eq(L::U::splat(i as u32));
+                (node, right) = (cut.nodes[i].or_else(here, node), cut.rights[i].or_else(here, right));
+                first = cut.firsts[i].or_else(here, first);
             }
             let within = ((target - start) / importance).max(zero).min(L::F::splat(BELOW_1));
-            let leaf = cut::descend(&tree.nodes, at, node, within, in_tree & pmf.gt(zero));
+            let leaf = cut::descend(&tree.nodes, at, (node, right, first), within, in_tree & pmf.gt(zero));
             // Beyond the cut come the suns, beyond the lights of the tree.
             let beyond = place + L::U::splat((choice.placed - near) as u32);
             light = leaf.light.or_else(in_tree, beyond);

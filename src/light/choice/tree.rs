@@ -4,12 +4,12 @@
 //! looked for is read off the length of their mean, not off a cone; only the tree that is built has cones. A cone for each
 //! bin and light would cost ten times as much, for the same decisions where it matters.
 
+use super::packed::pack;
 use crate::light::bounds::Bounds;
 use glam::DVec3;
 
-/// Records of a node: three of its bounds, then its right child (the left one is the next node) or [`LEAF`], and the
-/// number of its first light.
-pub const RECORDS: u32 = 4;
+/// Records of a node (`packed.rs`).
+pub const RECORDS: u32 = 2;
 /// In place of a right child.
 pub const LEAF: u32 = u32::MAX;
 const BINS: usize = 16;
@@ -21,7 +21,8 @@ type Node = [[f32; 4]; RECORDS as usize];
 /// Lights by place and direction.
 #[derive(Clone, Debug)]
 pub struct Tree {
-    /// Depth first.
+    /// Depth first: the left child is the next node. A subtree of n lights has 2 n - 1 nodes, which tells the numbers of
+    /// the lights on the way down.
     pub nodes: Vec<[f32; 4]>,
 }
 
@@ -30,7 +31,7 @@ impl Tree {
     /// does not depend on how many threads there are.
     pub fn new(lights: &[Bounds], order: &mut [u32], scale: f64, least: f64) -> Self {
         let mut nodes = vec![[[0.0; 4]; RECORDS as usize]; 2 * order.len() - 1];
-        Builder { lights, scale, least }.subtree(order, 0, 0, &mut nodes);
+        Builder { lights, scale, least }.subtree(order, 0, &mut nodes);
         Self { nodes: nodes.into_flattened() }
     }
 }
@@ -43,9 +44,8 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Builds the subtree over the lights of `order`, the first of which has the number `first`; its root is the first of
-    /// `nodes`, number `at` of all.
-    fn subtree(self, order: &mut [u32], first: usize, at: usize, nodes: &mut [Node]) -> Bounds {
+    /// Builds the subtree over the lights of `order`; its root is the first of `nodes`, number `at` of all.
+    fn subtree(self, order: &mut [u32], at: usize, nodes: &mut [Node]) -> Bounds {
         let (node, below) = nodes.split_first_mut().expect("a subtree of n lights has 2 n - 1 nodes");
         let (bounds, right) = if let [light] = *order {
             (self.lights[light as usize], LEAF)
@@ -54,8 +54,8 @@ impl Builder<'_> {
             let (low, high) = order.split_at_mut(mid);
             let (left, right) = below.split_at_mut(2 * mid - 1);
             let right_at = at + 2 * mid;
-            let mut build_left = |low| self.subtree(low, first, at + 1, left);
-            let mut build_right = |high| self.subtree(high, first + mid, right_at, right);
+            let mut build_left = |low| self.subtree(low, at + 1, left);
+            let mut build_right = |high| self.subtree(high, right_at, right);
             let (left, right) = if low.len() + high.len() > PARALLEL {
                 rayon::join(|| build_left(low), || build_right(high))
             } else {
@@ -63,8 +63,7 @@ impl Builder<'_> {
             };
             (left.union(&right), right_at as u32)
         };
-        let [a, b, c] = bounds.records(self.scale, self.least);
-        *node = [a, b, c, [f32::from_bits(right), f32::from_bits(first as u32), 0.0, 0.0]];
+        *node = pack(&bounds.records(self.scale, self.least), right);
         bounds
     }
 
