@@ -114,7 +114,7 @@ fn a_plan_agrees_with_the_render_that_follows() {
         assert_eq!(plan["camera"]["name"], run["camera"], "{}", run["input"]);
         assert_eq!(plan["triangles"]["traced"], run["triangles"], "{}", run["input"]);
         let lights = &plan["lights"];
-        let counts = ["emissive_triangles", "point", "spot", "directional"].map(|k| lights[k].as_u64().unwrap());
+        let counts = ["emissive_meshes", "point", "spot", "directional"].map(|k| lights[k].as_u64().unwrap());
         let environment = u64::from(lights["environment"].as_bool().unwrap());
         assert_eq!(counts.iter().sum::<u64>() + environment, run["lights"].as_u64().unwrap(), "{}", run["input"]);
     }

@@ -135,7 +135,7 @@ pub struct TexturePlan {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
 pub struct LightPlan {
-    /// Glowing meshes where they are placed: a light each.
+    /// Glowing meshes where they are placed, or parts of them that touch no other: a light each.
     pub emissive_meshes: usize,
     /// Their triangles.
     pub emissive_triangles: u64,

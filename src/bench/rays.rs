@@ -315,12 +315,7 @@ impl Kernel for Choose<'_> {
         for at in (0..POOL).step_by(L::N) {
             let p = V3::<L>::new(L::F::load(&from[0], at), L::F::load(&from[1], at), L::F::load(&from[2], at));
             let n = V3::<L>::new(L::F::load(&normal[0], at), L::F::load(&normal[1], at), L::F::load(&normal[2], at));
-            let u = [
-                L::F::load(&u[0], at),
-                L::F::load(&u[1], at),
-                L::F::load(&u[2], at),
-                L::F::load(&u[3], at),
-            ];
+            let u = [L::F::load(&u[0], at), L::F::load(&u[1], at), L::F::load(&u[2], at), L::F::load(&u[3], at)];
             let light = tables.lights.sample(&tables.lights.receiver::<L>(p, n), u, tables.sources(), scratch);
             light.wi.x.store(&mut towards[0], at);
             light.wi.y.store(&mut towards[1], at);

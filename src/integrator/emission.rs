@@ -3,6 +3,7 @@
 use super::SceneTables;
 use super::interaction::Interaction;
 use super::receiver::{self, Remembered};
+use super::weight::weight_of_remembered;
 use crate::math::V3;
 use crate::shape::table::NONE;
 use simd::{Float, Lanes, Mask, Part, Uint};
@@ -50,7 +51,7 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
             let cos = si.wo.dot(si.ng);
             le = le.scale(materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, lit));
         }
-        // Power heuristic against having sampled the same point as a light: 1 / (1 + (p_light / p_bsdf)^2). The ray
+        // Weighed against having sampled the same point as a light. The ray
         // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
         // Nothing samples what is no light, nor what camera rays and mirrors show.
         let light = si.triangle.light;
@@ -60,7 +61,7 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
         }
         let density = tables.lights.density::<L>(light) * distance * distance / si.wo.dot(si.triangle.ng).abs();
         let pmf = tables.lights.pmf::<L>(light, receiver::load(tables, from, at));
-        let ratio: L::F = (pmf * density / prev_pdf).masked(sampled);
-        (le.scale(L::F::one() / ratio.mul_add(ratio, L::F::one())), lit)
+        let other: L::F = (pmf * density).masked(sampled);
+        (le.scale(weight_of_remembered::<L>(prev_pdf, other)), lit)
     }
 }

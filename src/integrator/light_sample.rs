@@ -6,6 +6,7 @@ use super::interaction::Interaction;
 use super::medium::Crossing;
 use super::pool::PathPool;
 use super::shade::add_lanes;
+use super::weight::weight;
 use crate::light::choice::Receiver;
 use crate::math::V3;
 use simd::{Float, Lanes, Mask};
@@ -40,8 +41,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
-    let ratio = value.pdf / light.pdf;
-    let weight = one.or_else(light.is_delta, one / ratio.mul_add(ratio, one));
+    let weight = one.or_else(light.is_delta, weight::<L>(light.pdf, value.pdf, closure.bsdf.is_lambert()));
     let mut arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
     let (through, proper) = closure.sides(tables, si, light.wi);
     let sees = scatters & light.valid & proper;

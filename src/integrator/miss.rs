@@ -5,10 +5,11 @@ use super::medium::Stack;
 use super::pool::PathPool;
 use super::receiver;
 use super::shade::{add_lanes, load3};
+use super::weight::weight_of_remembered;
 use crate::math::V3;
 use simd::{Float, Lanes, Mask, Part};
 
-/// Adds what the environment sends along the rays `at ..` that are `missed`. The power heuristic weighs it against
+/// Adds what the environment sends along the rays `at ..` that are `missed`. It is weighed against
 /// having sampled the same direction as a light; rays from the camera or a mirror have infinite density and weight 1.
 #[inline(always)]
 pub fn see_environment<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, slot: L::U, missed: L::M) {
@@ -39,8 +40,7 @@ impl<L: Lanes> Part<L> for See<'_, L> {
         }
         let (radiance, pdf): (V3<L>, L::F) = tables.lights.environment::<L>(direction);
         let pmf = tables.lights.pmf_of_environment(receiver::load::<L>(tables, &pool.from, at));
-        let ratio = pmf * pdf / L::F::load(&pool.prev_pdf, at);
-        let weight = L::F::one() / ratio.mul_add(ratio, L::F::one());
+        let weight = weight_of_remembered::<L>(L::F::load(&pool.prev_pdf, at), pmf * pdf);
         add_lanes::<L>(pool, slot, (beta * radiance).scale(weight), missed);
     }
 }

@@ -19,6 +19,7 @@ mod shade;
 mod terminator;
 mod through;
 mod wave;
+mod weight;
 
 pub use coverage::Coverage;
 pub use dispersion::Spectrum;

@@ -11,6 +11,7 @@ use super::miss::see_environment;
 use super::pool::PathPool;
 use super::receiver::{self, receiver};
 use super::wave::Counters;
+use super::weight::remembered;
 use crate::accel::MISS;
 use crate::material::media::{AIR, MediumTable};
 use crate::math::V3;
@@ -32,7 +33,7 @@ struct Next<L: Lanes> {
     origin: V3<L>,
     direction: V3<L>,
     beta: V3<L>,
-    /// Density of the direction, 1/sr.
+    /// Density of the direction, as the pool remembers it.
     pdf: L::F,
     depth: L::U,
 }
@@ -188,7 +189,8 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         beta = beta.scale(L::F::one() / survival).or_else(rolls, beta);
     }
 
-    let mut next = Next { origin: start, direction: sample.wi, beta, pdf: sample.pdf, depth: depth + L::U::splat(1) };
+    let pdf = remembered::<L>(sample.pdf, closure.bsdf.is_lambert());
+    let mut next = Next { origin: start, direction: sample.wi, beta, pdf, depth: depth + L::U::splat(1) };
     let to = pool.n;
     if tables.media.transmits() {
         next.origin = si.behind().or_else(through, next.origin);

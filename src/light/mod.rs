@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod choice;
 pub mod element;
 pub mod environment;
+pub mod parts;
 pub mod studio;
 pub mod table;
 

@@ -1,6 +1,6 @@
 //! The lights of a scene: choosing one and a point on it, for next event estimation, and the density of that choice.
 //!
-//! A glowing mesh is one light, however many triangles it has; a triangle of it is chosen in proportion to its power. By
+//! A glowing mesh (each part of it that touches no other) is one light, however many triangles it has; a triangle of it is chosen in proportion to its power. By
 //! inverting distribution functions throughout (not by alias tables, which would undo the stratification of the numbers).
 
 use super::bounds::Bounds;
@@ -17,9 +17,9 @@ use simd::{Float, Lanes, Mask, Part, Uint};
 /// A light in the prepared scene's space. Its radiance, intensity or illuminance is above 0 and finite.
 #[derive(Clone, Debug)]
 pub enum PreparedLight {
-    /// A glowing mesh where it is placed.
+    /// A glowing mesh where it is placed, or a part of one.
     Mesh {
-        /// At least one.
+        /// At least one, of areas whose inverse is in the range of f32.
         triangles: Vec<LampTriangle>,
         /// Mean over channels and the surface, nits.
         radiance: f64,
@@ -164,12 +164,12 @@ impl LightTable {
         self.lights.is_empty()
     }
 
-    /// Lights, a glowing mesh being one; with the environment, sampled or not.
+    /// Lights, a part of a glowing mesh that touches no other being one; with the environment, sampled or not.
     pub fn len(&self) -> usize {
         self.lights.len() + usize::from(self.has_environment() && !self.samples_environment)
     }
 
-    /// Glowing meshes.
+    /// Glowing meshes, or parts of them that touch no other.
     pub fn emissive_meshes(&self) -> usize {
         self.emissive_meshes
     }

@@ -356,6 +356,12 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         if RICH && self.through.is_some() { r / (r + p).max(L::F::splat(1e-30)) } else { L::F::one() }
     }
 
+    /// Lanes with nothing but the diffuse lobe.
+    #[inline(always)]
+    pub fn is_diffuse(&self) -> L::M {
+        self.is_diffuse
+    }
+
     /// Value and density for `wi`; each lobe is zero beyond its horizon.
     #[inline(always)]
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {

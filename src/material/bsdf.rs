@@ -93,6 +93,13 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
         Self { base: self.base.with_diffuse_normal(&self.frame, normal, lanes), ..self }
     }
 
+    /// Lanes with nothing but a diffuse lobe.
+    #[inline(always)]
+    pub fn is_lambert(&self) -> L::M {
+        let layered = self.layered.iter().fold(0, |bits, (lane, _)| bits | 1 << lane);
+        self.base.is_diffuse() & !L::M::from_bits(layered)
+    }
+
     /// Value and density for world direction `wi`; each lobe is zero beyond its horizon.
     #[inline(always)]
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {

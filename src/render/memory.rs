@@ -179,10 +179,10 @@ const PLACEMENT: u64 = PlacementTable::BYTES as u64;
 const PLACEMENT_BUILDING: u64 = (size_of::<Placement>() + size_of::<Affine>() + 16) as u64;
 /// An instance while it is decided what is placed.
 const INSTANCE_CONSIDERED: u64 = 16;
-/// An element in `light::table` (five records, the end of its share), and what a choice knows of a light: two nodes of
-/// four records at most, and a record of its own.
+/// An element in `light::table` (five records, the end of its share), and what is held of a light beside: two nodes
+/// of a tree and a record. Meshes of parts that do not touch are several lights; that is not asked here.
 const LIGHT: u64 = 5 * 16 + 4;
-const CHOICE: u64 = (2 * 4 + 1) * 16;
+const CHOICE: u64 = 2 * 32 + 16;
 /// A texel of an environment: record and the end of its share.
 const ENVIRONMENT_TEXEL: u64 = 16 + 4;
 /// A texel of the map that it was made from, which stays.
@@ -228,7 +228,14 @@ impl Machinery {
         let accel = accel(vertices, [triangles, most_splits], placements, settings.accel);
         let list = lights * (size_of::<LampTriangle>() as u64 + 72 + 8);
         Self {
-            held: records + texels + levels.held + environment + lights * LIGHT + choices * CHOICE + placements * PLACEMENT + accel.held,
+            held: records
+                + texels
+                + levels.held
+                + environment
+                + lights * LIGHT
+                + choices * CHOICE
+                + placements * PLACEMENT
+                + accel.held,
             building: geometry
                 + levels.building
                 + (12 * largest).max(list)

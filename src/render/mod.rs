@@ -86,7 +86,7 @@ pub struct RenderStats {
     pub instances: u64,
     /// Placements of what was not merged into the world; meshes with the same places count once.
     pub placed_instances: u64,
-    /// Lights: punctual ones, emissive triangles and the environment.
+    /// Lights: punctual ones, glowing meshes (each part that touches no other) and the environment.
     pub lights: u64,
     /// Named yes/no facts about the scene, as in `features` of the JSON.
     pub features: Vec<(&'static str, bool)>,

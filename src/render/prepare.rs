@@ -12,8 +12,9 @@ use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables, Spectrum};
-use crate::light::environment::EnvironmentTable;
 use crate::light::element::LampTriangle;
+use crate::light::environment::EnvironmentTable;
+use crate::light::parts::connected;
 use crate::light::table::{LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::media::MediumTable;
@@ -380,10 +381,10 @@ fn flatten(
         }
     }
     if let Some(lights) = lights {
-        if !lamps.is_empty() {
-            let both_sides = material.is_some_and(|m| m.double_sided);
+        let both_sides = material.is_some_and(|m| m.double_sided);
+        for triangles in connected(lamps) {
             let material = mesh.material.0;
-            lights.push(PreparedLight::Mesh { triangles: lamps, radiance: average, both_sides, material });
+            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material });
         }
         totals.surface.add(mesh_area, material, emission);
     }

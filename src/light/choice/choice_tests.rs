@@ -273,7 +273,8 @@ fn the_sky_is_expected_where_it_stands_out() {
             // Nine coefficients have the cosine lobe within 7 % of its height.
             let up = 0.1 * (9.0 - 9.0 * 0.1 / (4.0 * std::f64::consts::PI));
             for angle in [0.0_f32, 0.5, 1.0, 1.5, 2.5, 3.1] {
-                let (found, exact) = (seen(Vec3::new(angle.sin(), angle.cos(), 0.0)), up * f64::from(angle.cos()).max(0.0));
+                let (found, exact) =
+                    (seen(Vec3::new(angle.sin(), angle.cos(), 0.0)), up * f64::from(angle.cos()).max(0.0));
                 assert!((found - exact).abs() < 0.07 * up, "{found} for {exact} at {angle}");
             }
             assert!(Sky::new(samples.iter().map(|s| (s.0, 2.0, s.2))).is_none(), "nothing stands out of a level sky");

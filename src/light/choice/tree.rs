@@ -83,7 +83,8 @@ impl Builder<'_> {
             }
             let mut bins = [Bin::EMPTY; BINS];
             for &light in order.iter() {
-                bins[bin_of(centre(light)[axis], box_of_centres[0][axis], extent[axis])].add(&self.lights[light as usize]);
+                bins[bin_of(centre(light)[axis], box_of_centres[0][axis], extent[axis])]
+                    .add(&self.lights[light as usize]);
             }
             // Long boxes are cut across.
             let shape = extent.max_element() / extent[axis];
