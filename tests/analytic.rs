@@ -134,6 +134,48 @@ fn back_of_a_lamp_is_dark() {
     assert!(shoot(&scene, &settings(4, 16, 0)).pixels.iter().flatten().all(|x| *x == 0.0));
 }
 
+/// A floor under `n` lights all around, every other one a lamp that faces the origin, and what the origin shows: the sum of
+/// what each gives, for none is in another's way there.
+fn floor_under(n: u32) -> (Scene, f64) {
+    let mut builder = SceneBuilder::new(0);
+    let (floor, glow) = (builder.add_material(scenes::lambert(0.6)), builder.add_material(scenes::lamp(0.0, 20.0)));
+    scenes::add_floor(&mut builder, 5.0, floor);
+    let mut irradiance = 0.0;
+    for i in 0..n {
+        // A spiral over the half sphere, at 2 to 5 m, wholly above the floor.
+        let cosine = 0.1 + 0.9 * (f64::from(i) + 0.5) / f64::from(n);
+        let (sin, cos) = (2.399_963 * f64::from(i)).sin_cos();
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let towards = DVec3::new(sine * cos, cosine, sine * sin);
+        let distance = 2.0 + 3.0 * f64::from(i * 7 % n) / f64::from(n);
+        let place = towards * distance;
+        if i % 2 == 0 {
+            let (x, y) = towards.any_orthonormal_pair();
+            // Counter-clockwise seen from the origin.
+            let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(u, v)| place + 0.05 * (x * u + y * v));
+            let front = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(towards) < 0.0;
+            let corners = if front { corners } else { [corners[3], corners[2], corners[1], corners[0]] };
+            scenes::add_quad(&mut builder, corners.map(|c| c.as_vec3().to_array()), glow);
+            irradiance += closed::polygon_irradiance(&corners, DVec3::ZERO, DVec3::Y, 20.0);
+        } else {
+            scenes::add_light(&mut builder, Light::Point { intensity: [0.3; 3] }, place, DVec3::NEG_Y);
+            irradiance += 0.3 * cosine / (distance * distance);
+        }
+    }
+    scenes::add_camera(&mut builder, DVec3::splat(0.5), DVec3::ZERO, POINT_VIEW);
+    (builder.finish(), 0.6 / PI * irradiance)
+}
+
+// A list of lights and a tree. Whatever the probabilities are, those told where a lamp is sampled and those found again
+// where a scattered ray hits it must be the same, or the sum is off: with the pmf at hits halved by 4 %.
+#[test]
+fn lgt_07_many_lights_light_a_floor_as_their_sum() {
+    for n in [40, 600] {
+        let (scene, value) = floor_under(n);
+        assert_shows(&format!("{n} lights"), &scene, &settings(8, 512, 0), value, SHARP);
+    }
+}
+
 /// Inside a closed cube of side 2 whose walls have albedo `albedo` and shine `radiance`.
 fn closed_room(albedo: f32, radiance: f32) -> Scene {
     let mut builder = SceneBuilder::new(0);

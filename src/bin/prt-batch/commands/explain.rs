@@ -177,6 +177,7 @@ fn light_lines(plan: &Explanation, lines: &mut Lines) {
     let Some(lights) = &plan.lights else { return };
     let light = plan.default_light.clone().unwrap_or_default();
     let counted = [
+        (lights.emissive_meshes as u64, "glowing meshes"),
         (lights.emissive_triangles, "emissive triangles"),
         (lights.point as u64, "point"),
         (lights.spot as u64, "spot"),
