@@ -4,6 +4,8 @@
 //! held against its error to a reference of another seed and at least 64 times the samples, whose own noise is taken off.
 //! The median of true over stated should be within 0.9 and 1.1, and 90 to 99 % of the true errors inside the intervals.
 
+use prt::compare::metrics;
+use prt::image::exr_read::Picture;
 use prt::load::{LoadOptions, load};
 use prt::render::{Frame, Progress, RenderSettings, render};
 use std::path::Path;
@@ -25,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             render(&scene, 0, &settings, &Progress::default())
         };
         let reference = shoot(REFERENCE, 1_000_003)?;
+        let endless = picture(&reference);
         let own = reference.stats.error.map_or(0.0, |error| error.value);
         for spp in SPP {
             let mut of_spp = Vec::new();
@@ -32,7 +35,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             for seed in 0..SEEDS {
                 let frame = shoot(spp, seed)?;
                 let Some(error) = frame.stats.error else { continue };
-                let actual = (relmse(&frame.pixels, &reference.pixels) - own * own).max(0.0).sqrt();
+                let relmse = metrics(&picture(&frame), &endless).relmse.unwrap_or(f64::NAN);
+                let actual = (relmse - own * own).max(0.0).sqrt();
                 held += usize::from(error.ci95[0] <= actual && actual <= error.ci95[1]);
                 (stated, truth) = (stated + error.value / SEEDS as f64, truth + actual / SEEDS as f64);
                 of_spp.push(actual / error.value);
@@ -58,13 +62,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// As `prt-batch compare` defines it.
-fn relmse(picture: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
-    let grey = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-    let mean = reference.iter().map(grey).sum::<f64>() / reference.len() as f64;
-    let of = |(a, r): (&[f32; 3], &[f32; 3])| {
-        let square: f64 = a.iter().zip(r).map(|(a, r)| (f64::from(*a) - f64::from(*r)).powi(2)).sum();
-        square / (grey(r).powi(2) + 0.01 * mean * mean) / 3.0
-    };
-    picture.iter().zip(reference).map(of).sum::<f64>() / picture.len() as f64
+fn picture(frame: &Frame) -> Picture {
+    let [width, height] = SIZE.map(|side| side as usize);
+    Picture { origin: [0, 0], width, height, pixels: frame.pixels.clone() }
 }

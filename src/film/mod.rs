@@ -145,7 +145,7 @@ impl Film {
     /// When a unit is missing.
     pub fn mean(&self) -> Vec<[f32; 3]> {
         let mut pixels = vec![[0.0; 3]; self.window.area()];
-        self.each_pixel(|x, y, blocks| {
+        let mut of_pixel = |x: usize, y: usize, blocks: [[f32; 4]; BLOCKS as usize]| {
             let (mut sum, mut count) = ([0.0f64; 3], 0.0f64);
             for block in blocks {
                 for (s, v) in sum.iter_mut().zip(block) {
@@ -154,23 +154,23 @@ impl Film {
                 count += f64::from(block[3]);
             }
             pixels[y * self.window.width as usize + x] = sum.map(|s| (s / count.max(1.0)) as f32);
-        });
+        };
+        (0..self.tiles.len()).for_each(|tile| self.each_pixel_of(tile, &mut of_pixel));
         pixels
     }
 
-    /// Calls `with` for each pixel of the window, by its place in it, with its blocks' sums; zeroes for blocks that there
-    /// are none of.
-    fn each_pixel(&self, mut with: impl FnMut(usize, usize, [[f32; 4]; BLOCKS as usize])) {
-        for (t, tile) in self.tiles.iter().enumerate() {
-            let units: Vec<&[[f32; 4]]> = (0..self.blocks.len())
-                .map(|block| &**self.sums[block * self.tiles.len() + t].get().expect("every unit was rendered"))
-                .collect();
-            for i in 0..tile.area() {
-                let mut blocks = [[0.0; 4]; BLOCKS as usize];
-                blocks.iter_mut().zip(&units).for_each(|(block, unit)| *block = unit[i]);
-                let (x, y) = (i % tile.width as usize, i / tile.width as usize);
-                with((tile.x - self.window.x) as usize + x, (tile.y - self.window.y) as usize + y, blocks);
-            }
+    /// Calls `with` for each pixel of tile `t`, by its place in the window, with its blocks' sums; zeroes for blocks that
+    /// there are none of.
+    fn each_pixel_of(&self, t: usize, mut with: impl FnMut(usize, usize, [[f32; 4]; BLOCKS as usize])) {
+        let tile = &self.tiles[t];
+        let units: Vec<&[[f32; 4]]> = (0..self.blocks.len())
+            .map(|block| &**self.sums[block * self.tiles.len() + t].get().expect("every unit was rendered"))
+            .collect();
+        for i in 0..tile.area() {
+            let mut blocks = [[0.0; 4]; BLOCKS as usize];
+            blocks.iter_mut().zip(&units).for_each(|(block, unit)| *block = unit[i]);
+            let (x, y) = (i % tile.width as usize, i / tile.width as usize);
+            with((tile.x - self.window.x) as usize + x, (tile.y - self.window.y) as usize + y, blocks);
         }
     }
 }

@@ -134,7 +134,8 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         Some(crossing) => crossing.eta,
         None => L::F::one(),
     };
-    let closure = closure::<L>(tables, &pool.hits, at, &si, eta, shaded);
+    let mut closure = closure::<L>(tables, &si, shaded);
+    closure.add_layers(tables, &pool.hits, at, &si, eta, shaded);
     let start = si.start();
 
     let receiver = receiver(tables, &si, &closure);

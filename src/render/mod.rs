@@ -25,7 +25,7 @@ pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
 pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};
 pub use progress::{Phase, Progress};
-pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, RenderSettings};
+pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, RenderSettings};
 pub use tracer::{camera, window};
 
 /// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
