@@ -152,7 +152,8 @@ fn floor_under(n: u32) -> (Scene, f64) {
         if i % 2 == 0 {
             let (x, y) = towards.any_orthonormal_pair();
             // Counter-clockwise seen from the origin.
-            let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(u, v)| place + 0.05 * (x * u + y * v));
+            let corners =
+                [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(u, v)| place + 0.05 * (x * u + y * v));
             let front = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(towards) < 0.0;
             let corners = if front { corners } else { [corners[3], corners[2], corners[1], corners[0]] };
             scenes::add_quad(&mut builder, corners.map(|c| c.as_vec3().to_array()), glow);

@@ -26,8 +26,8 @@ pub struct PathPool {
     pub hits: HitBatch,
     /// Throughput.
     pub beta: [Buffer<f32>; 3],
-    /// Density with which the ray's direction was sampled, 1/sr; infinite for camera rays and after a mirror, negative after
-    /// what is not Lambertian (`weight.rs`).
+    /// Density with which the ray's direction was sampled, 1/sr; infinite for camera rays and after a mirror, negative where
+    /// it is weighed by the balance heuristic (`weight.rs`).
     pub prev_pdf: Buffer<f32>,
     /// Scatterings so far.
     pub depth: Buffer<u32>,

@@ -190,7 +190,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         beta = beta.scale(L::F::one() / survival).or_else(rolls, beta);
     }
 
-    let pdf = remembered::<L>(sample.pdf, closure.bsdf.is_lambert());
+    let pdf = remembered::<L>(sample.pdf, !closure.bsdf.is_glossy());
     let mut next = Next { origin: start, direction: sample.wi, beta, pdf, depth: depth + L::U::splat(1) };
     let to = pool.n;
     if tables.media.transmits() {

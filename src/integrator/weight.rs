@@ -1,23 +1,23 @@
 //! Weights of two ways to find the same light, which sum to 1 at each vertex (Veach 1997, section 9.2).
 //!
-//! The power heuristic at vertices with nothing but a diffuse lobe, the balance heuristic at all others. Measured as
-//! relMSE at 64 samples, power against balance everywhere: Lambertian Cornell box 0.967; with specular lobes, of plastics
-//! and brick to gold: 1.006 to 1.038 (docs/decisions/0013-light-choice.md).
+//! The balance heuristic where a surface of metal and roughness has a specular lobe, the power heuristic where it is
+//! Lambertian or has more lobes. Measured as relMSE at 64 samples, balance over power everywhere: Lambertian Cornell box
+//! 1.03, cloth 1.06; plastics, brick and gold 0.96 to 0.98 (docs/decisions/0013-light-choice.md).
 
 use simd::{Float, Lanes};
 
-/// Weight of a sample taken with density `own` that would have been taken the other way with density `other`, at vertices
-/// that are Lambertian in the lanes of `is_lambert`.
+/// Weight of a sample taken with density `own` that would have been taken the other way with density `other`, by the
+/// power heuristic in the lanes of `by_power`.
 #[inline(always)]
-pub fn weight<L: Lanes>(own: L::F, other: L::F, is_lambert: L::M) -> L::F {
+pub fn weight<L: Lanes>(own: L::F, other: L::F, by_power: L::M) -> L::F {
     let (one, ratio) = (L::F::one(), other / own);
-    one / ratio.mul_add(ratio.or_else(is_lambert, one), one)
+    one / ratio.mul_add(ratio.or_else(by_power, one), one)
 }
 
-/// A density as paths remember it: negative where the vertex is not Lambertian.
+/// A density as paths remember it: negative where it is weighed by the balance heuristic.
 #[inline(always)]
-pub fn remembered<L: Lanes>(pdf: L::F, is_lambert: L::M) -> L::F {
-    pdf.or_else(is_lambert, -pdf)
+pub fn remembered<L: Lanes>(pdf: L::F, by_power: L::M) -> L::F {
+    pdf.or_else(by_power, -pdf)
 }
 
 /// [`weight`] of a density that is [`remembered`].
@@ -41,12 +41,12 @@ mod tests {
 
             #[inline(always)]
             fn run<L: Lanes>(self) {
-                for is_lambert in [L::M::from_bits(0), L::M::first(L::N)] {
+                for by_power in [L::M::from_bits(0), L::M::first(L::N)] {
                     for light in [0.0_f32, 1e-6, 0.3, 1.0, 50.0, 1e8] {
                         for bsdf in [1e-5_f32, 0.2, 1.0, 7.0, 1e6] {
                             let (light, bsdf) = (L::F::splat(light), L::F::splat(bsdf));
-                            let found = weight_of_remembered::<L>(remembered::<L>(bsdf, is_lambert), light).first();
-                            let sampled = weight::<L>(light, bsdf, is_lambert).first();
+                            let found = weight_of_remembered::<L>(remembered::<L>(bsdf, by_power), light).first();
+                            let sampled = weight::<L>(light, bsdf, by_power).first();
                             assert!((found + sampled - 1.0).abs() < 1e-6, "{found} and {sampled}");
                         }
                     }

@@ -95,11 +95,11 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
         self.base.set_diffuse_normal(&self.frame, normal, lanes);
     }
 
-    /// Lanes with nothing but a diffuse lobe.
+    /// Lanes of metal and roughness alone that have a specular lobe.
     #[inline(always)]
-    pub fn is_lambert(&self) -> L::M {
+    pub fn is_glossy(&self) -> L::M {
         let layered = self.layered.iter().fold(0, |bits, (lane, _)| bits | 1 << lane);
-        self.base.is_diffuse() & !L::M::from_bits(layered)
+        !(self.base.is_diffuse() | L::M::from_bits(layered))
     }
 
     /// Value and density for world direction `wi`; each lobe is zero beyond its horizon.
