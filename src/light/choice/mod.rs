@@ -97,12 +97,6 @@ impl Choice {
         (near + self.suns.len() + usize::from(self.sky.is_some())) * 16
     }
 
-    /// Bytes held, for the tests of memory estimates.
-    pub fn bytes(&self) -> usize {
-        let tree = self.tree.as_ref().map_or(0, |tree| tree.nodes.len());
-        (self.list.len() + tree + self.suns.len()) * size_of::<[f32; 4]>()
-    }
-
     /// The number of the light that is the sky.
     pub fn sky_number(&self) -> u32 {
         (self.placed + self.suns.len()) as u32
