@@ -308,7 +308,7 @@ impl File<'_> {
 
     /// Whether an earlier run left what this one would write.
     fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
-        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera);
+        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera, self.run.batch_time_limit);
         let json = match &plan.outputs.json {
             Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
             _ => return,
