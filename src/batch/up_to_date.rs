@@ -151,8 +151,10 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
     }
     // Files that are there and not asked for now do no harm.
     let files = FileOptions { exr: then.has_output("exr"), png: then.has_output("png"), ..*files };
-    check_stopping(&report, then, wanted)?;
-    let (pixel_settings, file_settings) = (wanted.pixel_settings(report.spp), file_settings(&files, render.layers));
+    // What was reached; nobody asks for none.
+    let spp = then.settings.get("spp").and_then(|spp| spp.parse().ok()).unwrap_or(0);
+    check_stopping(spp, &report, then, wanted)?;
+    let (pixel_settings, file_settings) = (wanted.pixel_settings(spp), file_settings(&files, render.layers));
     compare(&then.settings, &pixel_settings, &file_settings)?;
     let outputs: Vec<_> = kinds.map(|kind| json.with_extension(kind)).collect();
     let record = |path: &Path| then.outputs.iter().find(|o| path.extension().is_some_and(|e| *e == *o.kind));
@@ -170,15 +172,15 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
 /// Whether sampling ended where it would end now, too. What time allows differs from run to run: a picture that was
 /// ended by its time is kept where the same time is asked for, and no limit of time says anything against one that has
 /// all that was asked for.
-fn check_stopping(report: &ImageReport, then: &Fingerprint, wanted: &Wanted) -> Result<(), Why> {
+fn check_stopping(spp: u32, report: &ImageReport, then: &Fingerprint, wanted: &Wanted) -> Result<(), Why> {
     let fixed = |spp| StoppingRecord { spp, target_error: None, time_limit: None, batch_time_limit: None };
     let is_open = wanted.stopping().is_some();
     let now = wanted.stopping().unwrap_or_else(|| fixed(wanted.settings.render.spp));
     // However it was ended: the samples are what counts.
-    let then = then.stopping.clone().filter(|_| is_open).unwrap_or_else(|| fixed(report.spp));
+    let then = then.stopping.clone().filter(|_| is_open).unwrap_or_else(|| fixed(spp));
     let has_target = then.target_error == now.target_error;
-    let has_all = report.spp == now.spp && (now.target_error.is_none() || has_target);
-    let is_good = report.stopped_by.as_deref() == Some("target-error") && has_target && report.spp <= now.spp;
+    let has_all = spp == now.spp && (now.target_error.is_none() || has_target);
+    let is_good = report.stopped_by.as_deref() == Some("target-error") && has_target && spp <= now.spp;
     if has_all || is_good {
         return Ok(());
     }
