@@ -5,6 +5,8 @@
 //! samples, whose own noise is taken off. The median of true over stated should be within 0.9 and 1.1, and 90 to 99 % of
 //! the true errors inside the intervals.
 
+use prt::compare::metrics;
+use prt::image::exr_read::Picture;
 use prt::load::{LoadOptions, load};
 use prt::render::{Frame, Progress, RenderSettings, Stopping, render};
 use prt::scene::Scene;
@@ -43,6 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let path = Path::new(&path);
         let (scene, _) = load(path, &LoadOptions::default())?;
         let reference = shoot(&scene, End::Spp(REFERENCE), 1_000_003)?;
+        let endless = picture(&reference);
         let own = reference.stats.error.map_or(0.0, |error| error.value);
         let ends: Vec<End> = if options.iter().any(|option| option == "--targets") {
             let at_64 = shoot(&scene, End::Spp(64), 1_000_003)?.stats.error.map_or(0.1, |error| error.ci95[1]);
@@ -56,7 +59,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             for seed in 0..SEEDS {
                 let frame = shoot(&scene, end, seed)?;
                 let Some(error) = frame.stats.error else { continue };
-                let actual = (relmse(&frame.pixels, &reference.pixels) - own * own).max(0.0).sqrt();
+                let relmse = metrics(&picture(&frame), &endless).relmse.unwrap_or(f64::NAN);
+                let actual = (relmse - own * own).max(0.0).sqrt();
                 held += usize::from(error.ci95[0] <= actual && actual <= error.ci95[1]);
                 above += usize::from(frame.stats.target.is_some_and(|target| actual > target.target));
                 (stated, truth) = (stated + error.value / SEEDS as f64, truth + actual / SEEDS as f64);
@@ -88,13 +92,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// As `prt-batch compare` defines it.
-fn relmse(picture: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
-    let grey = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-    let mean = reference.iter().map(grey).sum::<f64>() / reference.len() as f64;
-    let of = |(a, r): (&[f32; 3], &[f32; 3])| {
-        let square: f64 = a.iter().zip(r).map(|(a, r)| (f64::from(*a) - f64::from(*r)).powi(2)).sum();
-        square / (grey(r).powi(2) + 0.01 * mean * mean) / 3.0
-    };
-    picture.iter().zip(reference).map(of).sum::<f64>() / picture.len() as f64
+fn picture(frame: &Frame) -> Picture {
+    let [width, height] = SIZE.map(|side| side as usize);
+    Picture { origin: [0, 0], width, height, pixels: frame.pixels.clone() }
 }

@@ -12,7 +12,7 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("color", &[]),
     ("sampler", &["math"]),
     ("image", &["color", "error", "math"]),
-    ("texture", &["error", "id", "image", "math"]),
+    ("texture", &["color", "error", "id", "image", "math"]),
     ("material", &["error", "id", "math", "texture"]),
     ("shape", &["error", "id", "math"]),
     ("light", &["id", "material", "math", "shape", "texture"]),

@@ -2,19 +2,19 @@
 
 mod support;
 
-use prt::render::{AccelChoice, RenderSettings, StoppedBy, Stopping};
+use prt::compare::metrics;
+use prt::image::exr_read::Picture;
+use prt::render::{AccelChoice, Frame, RenderSettings, StoppedBy, Stopping};
 use support::pictures::{settings, shoot};
 use support::scenes;
 
-/// sqrt(relMSE) as `compare` defines it.
-fn error(picture: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
-    let grey = |p: &[f32; 3]| p.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0;
-    let mean = reference.iter().map(grey).sum::<f64>() / reference.len() as f64;
-    let of = |(a, r): (&[f32; 3], &[f32; 3])| {
-        let square: f64 = a.iter().zip(r).map(|(a, r)| (f64::from(*a) - f64::from(*r)).powi(2)).sum();
-        square / (grey(r).powi(2) + 0.01 * mean * mean) / 3.0
+/// sqrt(relMSE).
+fn error(frame: &Frame, reference: &Frame) -> f64 {
+    let picture = |frame: &Frame| {
+        let (width, height) = (frame.width as usize, frame.height as usize);
+        Picture { origin: [0, 0], width, height, pixels: frame.pixels.clone() }
     };
-    (picture.iter().zip(reference).map(of).sum::<f64>() / picture.len() as f64).sqrt()
+    metrics(&picture(frame), &picture(reference)).relmse.expect("numbers").sqrt()
 }
 
 /// Seeds 0..8 against one picture of seed 1,000,003 with 2048 samples, whose own variance is taken off. If 90 % of true
@@ -34,7 +34,7 @@ fn adp_02_pictures_end_when_they_are_as_good_as_they_were_to_be() {
             let stated = frame.stats.error.expect("it is not black");
             assert_eq!(frame.stats.stopped_by, StoppedBy::TargetError, "{scene}: {} spp, {stated:?}", frame.spp);
             assert!(stated.ci95[1] <= target && frame.spp < 1024, "{scene}: {stated:?}");
-            let truth = (error(&frame.pixels, &reference.pixels).powi(2) - own * own).max(0.0).sqrt();
+            let truth = (error(&frame, &reference).powi(2) - own * own).max(0.0).sqrt();
             inside += usize::from(stated.ci95[0] <= truth && truth <= stated.ci95[1]);
             below += usize::from(truth <= target);
             ratios.push(truth / stated.value);

@@ -148,6 +148,18 @@ pub fn hash_sources(sources: &[SourceFile], cache: &HashCache) -> Result<Vec<Inp
     sources.iter().map(record).collect()
 }
 
+/// What was in a file of an option's when it was read; `file` is from before that.
+///
+/// # Errors
+/// It did not stay as it was; the text names the option.
+pub(super) fn content_of(option: &str, file: &SourceFile, cache: &HashCache) -> Result<Content, String> {
+    let changed = |changed: Changed| format!("{option} {changed}\n  Run it again when it is complete.");
+    let records = hash_sources(std::slice::from_ref(file), cache).map_err(changed)?;
+    let content = records.first().and_then(InputRecord::content);
+    // It was read, so it was there; a stamp is missing only where it came into being just then.
+    content.ok_or_else(|| changed(Changed { path: file.path.clone(), error: None }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

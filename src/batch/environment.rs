@@ -1,6 +1,6 @@
 //! The environment of every input, in place of its own.
 
-use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
+use super::content::{Content, HashCache, content_of};
 use crate::light::Environment;
 use crate::load::load_environment;
 use crate::scene::{Scene, Skipped, SourceFile};
@@ -70,11 +70,7 @@ impl Maps {
 fn read(path: &Path, cache: &HashCache) -> Result<(Environment, Vec<String>, Content), String> {
     let file = SourceFile::input(path);
     let (environment, warnings) = load_environment(path).map_err(|error| format!("--env {error}"))?;
-    let changed = |changed: Changed| format!("--env {changed}\n  Run it again when it is complete.");
-    let records = hash_sources(std::slice::from_ref(&file), cache).map_err(changed)?;
-    let content = records.first().and_then(InputRecord::content);
-    // It was read, so it was there; a stamp is missing only where it came into being just then.
-    let content = content.ok_or_else(|| changed(Changed { path: path.into(), error: None }))?;
+    let content = content_of("--env", &file, cache)?;
     Ok((environment, warnings, content))
 }
 

@@ -4,7 +4,7 @@
 //! asked for (`auto`, a width without a height), and the bytes of files instead of what a loader makes of them. It holds
 //! no path, and nothing of this machine: equal inputs in another folder have the same fingerprint.
 
-use super::content::{Changed, Content, HashCache, InputRecord, hash_sources};
+use super::content::{Content, HashCache, InputRecord, content_of};
 use super::develop::Tone;
 use super::environment::EnvironmentOrigin;
 use super::picture::FileOptions;
@@ -108,17 +108,10 @@ impl CameraOrigin {
             CameraSource::Inputs | CameraSource::View(_) => None,
         };
         let cameras = source.cameras()?;
-        let origin = match source {
-            CameraSource::Inputs => Self::Input,
-            CameraSource::View(view) => Self::View(*view),
-            CameraSource::File(path) => {
-                let changed =
-                    |changed: Changed| format!("--camera-from {changed}\n  Run it again when it is complete.");
-                let records = hash_sources(file.as_slice(), cache).map_err(changed)?;
-                let content = records.first().and_then(InputRecord::content);
-                // It was read, so it was there; a stamp is missing only where it came into being just then.
-                Self::File(content.ok_or_else(|| changed(Changed { path: path.clone(), error: None }))?)
-            }
+        let origin = match (source, file) {
+            (CameraSource::View(view), _) => Self::View(*view),
+            (_, Some(file)) => Self::File(content_of("--camera-from", &file, cache)?),
+            (_, None) => Self::Input,
         };
         Ok((cameras, origin))
     }

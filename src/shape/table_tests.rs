@@ -43,10 +43,8 @@ fn read<L: Lanes>(table: &TriangleTable, u: f32, v: f32) -> Numbers {
 
 #[inline(always)]
 fn store<L: Lanes>(values: &[L::F], out: &mut [f32]) {
-    let mut lanes = [0.0; 16];
     for (value, out) in values.iter().zip(out) {
-        value.store(&mut lanes, 0);
-        *out = lanes[0];
+        *out = value.first();
     }
 }
 

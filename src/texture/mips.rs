@@ -6,6 +6,7 @@
 //! The mean is confined to the image: what lies beyond its border is the wrap mode's, which every level has.
 
 use super::{Few, Texels};
+use crate::color::{linear_from_srgb, srgb_from_linear};
 use rayon::prelude::*;
 
 /// What texels become one by.
@@ -118,7 +119,7 @@ impl Coding {
             Texels::Rgba8(_) | Texels::Few8(_) => 255,
             Texels::Rgba16(_) | Texels::Few16(_) => 65_535,
         };
-        let decoded = |v: u16| linear(f64::from(v) / f64::from(largest)) as f32;
+        let decoded = |v: u16| linear_from_srgb(f64::from(v) / f64::from(largest)) as f32;
         let light = (average != Average::Values).then(|| (0..=largest).map(decoded).collect());
         Self { light, largest: f32::from(largest) }
     }
@@ -132,7 +133,7 @@ impl Coding {
 
     /// Channel `c` of `t`, as it is stored.
     fn stored(&self, t: &[f32; 4], c: usize) -> f32 {
-        let v = if self.light.is_some() && c < 3 { encoded(f64::from(t[c])) as f32 } else { t[c] };
+        let v = if self.light.is_some() && c < 3 { srgb_from_linear(f64::from(t[c])) as f32 } else { t[c] };
         (v.clamp(0.0, 1.0) * self.largest).round()
     }
 
@@ -155,16 +156,6 @@ fn kept<T>(like: &Few<T>, level: &[[f32; 4]], stored: impl Fn(&[f32; 4], usize) 
         (0..like.kept).map(|k| like.at.iter().position(|&at| usize::from(at) == k).unwrap_or(0)).collect();
     let values = level.iter().flat_map(|t| read.iter().map(|&c| stored(t, c))).collect();
     Few { values, kept: like.kept, at: like.at }
-}
-
-/// sRGB to linear, IEC 61966-2-1.
-fn linear(v: f64) -> f64 {
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Linear to sRGB, IEC 61966-2-1.
-fn encoded(v: f64) -> f64 {
-    if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

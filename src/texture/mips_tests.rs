@@ -24,7 +24,7 @@ fn all_levels(texels: &Texels, size: Size, average: Average) -> Vec<Texels> {
 /// Mean of channel `c`, as encoded or as light.
 fn mean_of(texels: &Texels, c: usize, is_light: bool) -> f64 {
     let value = |i| f64::from(texels.get(i)[c]);
-    let values = (0..texels.len()).map(|i| if is_light { linear(value(i)) } else { value(i) });
+    let values = (0..texels.len()).map(|i| if is_light { linear_from_srgb(value(i)) } else { value(i) });
     values.sum::<f64>() / texels.len() as f64
 }
 

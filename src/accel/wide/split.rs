@@ -31,7 +31,7 @@ pub enum SpatialSplits {
 
 /// Parts beyond one a triangle at most, as a share of the triangles. With 0.1 and 0.3 instead of 0.5 a timber hall
 /// gave 1.28 and 1.5 times the camera rays a second instead of 1.8.
-const BUDGET: f64 = 0.5;
+pub const MOST_SPLITS: f64 = 0.5;
 /// Parts of one triangle at most, less 1.
 const MOST: f32 = 4095.0;
 /// Cells of the grid along each axis: where its planes may lie.
@@ -63,6 +63,11 @@ pub struct Survey {
 impl Survey {
     const NOTHING: Self = Self { bounds: Bounds::EMPTY, emptiness: 0.0, is_complete: true };
 
+    fn add(&mut self, bounds: &Bounds, emptiness: f64) {
+        self.bounds = Bounds(std::array::from_fn(|i| self.bounds.0[i].min(bounds.0[i])));
+        self.emptiness += emptiness;
+    }
+
     /// Whether boxes are so empty that a trial is made. NaN and infinite areas: no.
     fn calls_for_a_trial(&self) -> bool {
         let is_empty = self.emptiness >= EMPTY_BOXES * f64::from(self.bounds.half_area());
@@ -75,8 +80,7 @@ impl Survey {
             references.par_chunks(CHUNK).map(|references| dispatch(level, Look { references })).collect();
         let mut all = Self::NOTHING;
         for part in parts {
-            all.bounds = Bounds(std::array::from_fn(|i| all.bounds.0[i].min(part.bounds.0[i])));
-            all.emptiness += part.emptiness;
+            all.add(&part.bounds, part.emptiness);
             all.is_complete &= part.is_complete;
         }
         all
@@ -109,15 +113,11 @@ pub fn may_split(triangles: impl Iterator<Item = [Vec3; 3]>) -> bool {
     for corners in triangles {
         let r = Reference::of_corners(corners, 0);
         if r.is_something() {
-            all.bounds = Bounds(std::array::from_fn(|i| all.bounds.0[i].min(r.0.0[i])));
-            all.emptiness += f64::from(r.emptiness());
+            all.add(&r.0, f64::from(r.emptiness()));
         }
     }
     all.calls_for_a_trial()
 }
-
-/// Parts beyond one a triangle at most, as a share of the triangles.
-pub const MOST_SPLITS: f64 = BUDGET;
 
 /// Whether splitting `references`, none of which stands for nothing, pays: a matter of their boxes and, if these are
 /// empty enough, of the SAH costs of trees over a sample of them.
@@ -138,7 +138,7 @@ pub fn pays(triangles: &Source<'_>, references: &[Reference], survey: &Survey) -
 pub fn split(triangles: &Source<'_>, references: Vec<Reference>, bounds: &Bounds) -> Vec<Reference> {
     let grid = Grid::new(bounds);
     let n = references.len();
-    let budget = ((n as f64 * BUDGET) as usize).min(Child::MAX_TRIANGLES - 1 - n) as u64;
+    let budget = ((n as f64 * MOST_SPLITS) as usize).min(Child::MAX_TRIANGLES - 1 - n) as u64;
     let priorities: Vec<f32> =
         references.par_iter().with_min_len(CHUNK).map(|reference| grid.priority(reference)).collect();
     let Some(scale) = scale(&priorities, budget) else { return references };
