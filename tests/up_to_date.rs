@@ -547,7 +547,9 @@ fn why_after(then: Limits, ended: Option<(u32, &'static str)>, now: Limits) -> S
 fn a_picture_that_reached_its_error_is_kept_for_the_same_error_whatever_time_there_is() {
     let then = (1024, Some(0.01), None, None);
     let ended = Some((96, "target-error"));
-    for now in [then, (2048, Some(0.01), None, None), (1024, Some(0.01), Some(5), Some(9)), (96, Some(0.01), None, None)] {
+    for now in
+        [then, (2048, Some(0.01), None, None), (1024, Some(0.01), Some(5), Some(9)), (96, Some(0.01), None, None)]
+    {
         assert_eq!(why_after(then, ended, now), "", "{now:?}");
     }
     assert_eq!(why_after(then, ended, (1024, Some(0.02), None, None)), "settings changed: target-error 0.01 -> 0.02");

@@ -269,7 +269,8 @@ pub fn file_settings(files: &FileOptions, layers: Layers) -> Settings {
         lines.insert("exr".into(), name(samples));
         lines.insert("exr-compression".into(), name(compression));
         let Layers { variance, samples } = layers;
-        let layers: Vec<_> = [("variance", variance), ("samples", samples)].into_iter().filter(|layer| layer.1).collect();
+        let layers: Vec<_> =
+            [("variance", variance), ("samples", samples)].into_iter().filter(|layer| layer.1).collect();
         // Named only where there are any: pictures without have the fingerprints that they had before there were any.
         if !layers.is_empty() {
             lines.insert("aov".into(), layers.iter().map(|layer| layer.0).collect::<Vec<_>>().join(","));

@@ -2,7 +2,9 @@
 
 use super::develop::Tone;
 use crate::camera::Projection;
-use crate::image::exr::{self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue};
+use crate::image::exr::{
+    self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue,
+};
 use crate::render::{Brdf, Frame, RenderSettings};
 
 /// Which files, and how.
@@ -66,7 +68,8 @@ fn channels(frame: &Frame) -> Vec<ExrChannel> {
         name: ["variance.R", "variance.G", "variance.B"][channel],
         samples: ExrChannelSamples::Float(variance.iter().map(|v| v[channel]).collect()),
     };
-    let samples = |samples: &Vec<u32>| ExrChannel { name: "samples", samples: ExrChannelSamples::Uint(samples.clone()) };
+    let samples =
+        |samples: &Vec<u32>| ExrChannel { name: "samples", samples: ExrChannelSamples::Uint(samples.clone()) };
     let variances = frame.variance.iter().flat_map(|of_pixels| (0..3).map(move |channel| (of_pixels, channel)));
     variances.map(variance).chain(frame.samples.iter().map(samples)).collect()
 }

@@ -28,7 +28,7 @@ fn children(block: &Range<u32>) -> Option<[Range<u32>; 2]> {
     let Range { start, end } = *block;
     let is_whole = end.is_power_of_two() && if start == 0 { end > 1 } else { end == 2 * start && start > 1 };
     let middle = start + (end - start) / 2;
-    is_whole.then(|| [start..middle, middle..end])
+    is_whole.then_some([start..middle, middle..end])
 }
 
 /// The blocks of `layout(to)` that lie beyond `from` samples, cut where `from` cuts one.
@@ -122,11 +122,13 @@ mod tests {
         // A sum that remembers how it was made.
         let join = |a: &mut String, b: String| *a = format!("({a} {b})");
         let part = |block: &Range<u32>| {
-            let mut leaves: Vec<_> = leaves(block).into_iter().map(|leaf| (leaf.clone(), format!("{leaf:?}"))).collect();
+            let mut leaves: Vec<_> =
+                leaves(block).into_iter().map(|leaf| (leaf.clone(), format!("{leaf:?}"))).collect();
             (block.clone(), joined(block, &mut leaves, &join))
         };
         let at_once = |spp: u32| layout(spp).iter().map(part).collect::<Vec<_>>();
-        for ends in [vec![32, 64, 96, 128, 192, 200], vec![1, 2, 4, 8, 16, 32, 37], vec![96, 512], vec![3, 6, 7], vec![12]]
+        for ends in
+            [vec![32, 64, 96, 128, 192, 200], vec![1, 2, 4, 8, 16, 32, 37], vec![96, 512], vec![3, 6, 7], vec![12]]
         {
             let mut held: Vec<(Range<u32>, String)> = Vec::new();
             let mut from = 0;

@@ -153,8 +153,9 @@ impl Halves {
     /// Those of one channel of a pixel.
     fn differences(&self, blocks: &[[f32; 4]], channel: usize) -> Differences {
         let mean = |blocks: &[[f32; 4]]| {
-            let (sum, count) =
-                blocks.iter().fold((0.0, 0.0), |(sum, count), b| (sum + f64::from(b[channel]), count + f64::from(b[3])));
+            let (sum, count) = blocks
+                .iter()
+                .fold((0.0, 0.0), |(sum, count), b| (sum + f64::from(b[channel]), count + f64::from(b[3])));
             sum / f64::max(count, 1.0)
         };
         let square = |a: &[[f32; 4]], b: &[[f32; 4]]| (mean(a) - mean(b)).powi(2);
@@ -227,9 +228,8 @@ impl Film {
             all.by_own.add(1.0, cell.by_own);
             all
         });
-        let error = |differences: Differences, count: f64| {
-            (halves.variance(differences).at(self.spp) / (3.0 * count)).sqrt()
-        };
+        let error =
+            |differences: Differences, count: f64| (halves.variance(differences).at(self.spp) / (3.0 * count)).sqrt();
         let value = error(all.differences, count);
         // Each cell left out in turn (the jackknife), on the logarithm; and how much it is a matter of what pixels in which
         // few samples were bright will show in the end.

@@ -10,7 +10,7 @@
 pub mod blocks;
 mod estimate;
 
-pub use estimate::{Errors, ErrorEstimate, Square};
+pub use estimate::{ErrorEstimate, Errors, Square};
 
 use rayon::prelude::*;
 use std::ops::Range;
@@ -111,7 +111,8 @@ impl TileSums {
             let sums = self.sums.iter().skip(leaf).step_by(self.leaves as usize);
             sums.map(|&([r, g, b], n)| [r.rounded(), g.rounded(), b.rounded(), n as f32]).collect()
         };
-        let mut parts = blocks::leaves(&self.block).into_iter().enumerate().map(|(i, leaf)| (leaf, of_leaf(i))).collect();
+        let mut parts =
+            blocks::leaves(&self.block).into_iter().enumerate().map(|(i, leaf)| (leaf, of_leaf(i))).collect();
         blocks::joined(&self.block, &mut parts, &|sums, other| add_all(sums, &other))
     }
 }
@@ -236,7 +237,8 @@ impl Film {
     fn each_pixel(&self, mut with: impl FnMut(usize, &[[f32; 4]])) {
         let mut blocks = Vec::with_capacity(self.blocks.len());
         for (t, tile) in self.tiles.iter().enumerate() {
-            let first = (tile.y - self.window.y) as usize * self.window.width as usize + (tile.x - self.window.x) as usize;
+            let first =
+                (tile.y - self.window.y) as usize * self.window.width as usize + (tile.x - self.window.x) as usize;
             for i in 0..tile.area() {
                 blocks.clear();
                 blocks.extend(self.blocks.iter().map(|(_, tiles)| tiles[t][i]));
@@ -299,7 +301,9 @@ mod tests {
             let mixed = (x * 7919 + y * 104_729 + sample * 1_299_709).wrapping_mul(0x7feb_352d);
             [1.0, 1e-3, 1e4].map(|scale| scale * (mixed >> 8) as f32 / 16_777_216.0)
         };
-        for (ends, spp) in [(&[32, 64, 96, 128][..], 128), (&[1, 2, 4, 8, 16, 32, 37], 37), (&[64, 96], 96), (&[3, 6], 6)] {
+        for (ends, spp) in
+            [(&[32, 64, 96, 128][..], 128), (&[1, 2, 4, 8, 16, 32, 37], 37), (&[64, 96], 96), (&[3, 6], 6)]
+        {
             let (in_waves, at_once) = (film(window, 16, ends, radiance), film(window, TILE, &[spp], radiance));
             let pixels = at_once.mean();
             assert_eq!(in_waves.mean(), pixels, "{spp}");

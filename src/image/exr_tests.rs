@@ -23,7 +23,15 @@ fn picture(width: u32, height: u32, pixels: &[[f32; 3]]) -> ExrPicture<'_> {
         ("prt:truncated", ExrValue::Double(0.25)),
         ("prt:accel", ExrValue::Text("bvh".into())),
     ];
-    ExrPicture { display_size: [width, height], origin: [0, 0], size: [width, height], pixels, channels: Vec::new(), camera, attributes }
+    ExrPicture {
+        display_size: [width, height],
+        origin: [0, 0],
+        size: [width, height],
+        pixels,
+        channels: Vec::new(),
+        camera,
+        attributes,
+    }
 }
 
 fn zip(picture: &ExrPicture<'_>) -> Vec<u8> {

@@ -66,7 +66,9 @@ impl Meaning {
                     let settings = match by_options.get(&merged) {
                         Some(settings) => Arc::clone(settings),
                         None => {
-                            let settings = definition.options(&merged).and_then(|args| file_settings(&args.file, run.batch_time_limit));
+                            let settings = definition
+                                .options(&merged)
+                                .and_then(|args| file_settings(&args.file, run.batch_time_limit));
                             Arc::new(settings.map_err(|why| match about.is_empty() {
                                 true => why,
                                 false => format!("{}: {why}", input.path.display()),
@@ -116,8 +118,7 @@ const DEFAULT_SPP: u32 = 64;
 /// # Errors
 /// An option lacks another, or excludes it; the text names both.
 pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Result<FileSettings, String> {
-    let stopping =
-        Stopping { target_error: args.target_error, time_limit: args.time_limit, ..Stopping::default() };
+    let stopping = Stopping { target_error: args.target_error, time_limit: args.time_limit, ..Stopping::default() };
     let default_spp = if stopping.is_open() || batch_time_limit.is_some() { parse::MAX_SPP } else { DEFAULT_SPP };
     if args.aov.is_some() && args.no_exr {
         return Err("--aov needs the EXR, whose layers it is about, and --no-exr is given".into());

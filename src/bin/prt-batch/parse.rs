@@ -114,10 +114,7 @@ pub fn duration(value: &str) -> Result<Duration, String> {
 }
 
 const AOVS: Words<Layers> = Words::new(
-    &[
-        ("variance", Layers { variance: true, samples: false }),
-        ("samples", Layers { variance: false, samples: true }),
-    ],
+    &[("variance", Layers { variance: true, samples: false }), ("samples", Layers { variance: false, samples: true })],
     &["albedo", "normal", "depth", "position", "uv", "object-id", "material-id", "cryptomatte"],
 );
 

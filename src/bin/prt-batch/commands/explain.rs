@@ -151,9 +151,9 @@ fn text(plan: &Explanation) -> String {
 fn stopping_text(stopping: &StoppingRecord) -> String {
     let error = stopping.target_error.map(|error| format!("the error is at most {}", report::percent(error)));
     let time = stopping.time_limit.map(|limit| format!("{} of sampling are over", report::seconds(limit)));
-    let batch = stopping.batch_time_limit.map(|limit| {
-        format!("its equal share is over of what is left of {} for all images", report::seconds(limit))
-    });
+    let batch = stopping
+        .batch_time_limit
+        .map(|limit| format!("its equal share is over of what is left of {} for all images", report::seconds(limit)));
     let ends: Vec<_> = error.into_iter().chain(time).chain(batch).collect();
     format!("when {}, or with the last sample", ends.join(", or "))
 }

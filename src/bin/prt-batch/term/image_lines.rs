@@ -72,11 +72,13 @@ pub fn details(image: &ImageReport) -> Vec<String> {
         let [low, high] = error.ci95.map(percent);
         let by = image.stopped_by.as_deref().filter(|by| *by != "spp");
         let by = by.map_or(String::new(), |by| format!("; ended by --{by}"));
-        let worst = image.worst_tile.as_ref().map_or(String::new(), |worst| {
-            format!("; worst at {},{}: {}", worst.x, worst.y, percent(worst.error))
-        });
+        let worst = image
+            .worst_tile
+            .as_ref()
+            .map_or(String::new(), |worst| format!("; worst at {},{}: {}", worst.x, worst.y, percent(worst.error)));
         let above = image.target_error.as_ref().and_then(|target| target.pixels_above);
-        let above = above.map_or(String::new(), |share| format!("; {:.0} % of the pixels above the target", 100.0 * share));
+        let above =
+            above.map_or(String::new(), |share| format!("; {:.0} % of the pixels above the target", 100.0 * share));
         lines.push(format!("  error {} ({low} to {high}){by}{worst}{above}", error.percent()));
     }
     if let (Some(rays), Some(triangles)) = (&image.rays, image.triangles) {
