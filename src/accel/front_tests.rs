@@ -32,6 +32,30 @@ fn geo06_scenes_that_reach_farther_than_1e12_m_or_nowhere_have_no_front() {
 }
 
 #[test]
+fn surfaces_that_are_welded_to_what_is_left_are_not_taken_apart() {
+    // Two walls of two triangles and many small ones: alone, at the edge of the first wall, at its corner, at a T-junction.
+    let walls = [[0.0, 0.0, -0.0], [9.0, 0.0, 0.0], [9.0, 9.0, 0.0], [0.0, 9.0, 0.0]];
+    let positions = |offset: f32| walls.map(|[x, y, z]| [x, y, z + offset]);
+    let front = |small: [[f32; 3]; 3]| {
+        let positions = positions(0.0).into_iter().chain(positions(5.0)).chain(small).collect();
+        let walls = [[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+        let indices = walls.into_iter().chain([[8, 9, 10]; 100]).collect();
+        let Split { all, front } = Split::new(Triangles { positions, indices }).apart();
+        let (big, rest) = front.expect("a wall");
+        assert_eq!(all.triangle_count(), big.triangles.len() + rest.triangle_count());
+        big.triangles.iter().map(|t| t.primitive).collect::<Vec<_>>()
+    };
+    assert_eq!(front([[4.0, 0.0, 0.1], [4.1, 0.0, 0.1], [4.0, 0.01, 0.1]]), [0, 1, 2, 3], "apart");
+    assert_eq!(front([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.01, 0.1]]), [0, 1, 2, 3], "a corner");
+    assert_eq!(front([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 0.01, 0.0]]), [0, 1, 2, 3], "a part of an edge");
+    assert_eq!(
+        front([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0], [4.0, 0.01, 0.0]]),
+        [2, 3],
+        "an edge, and by it the whole wall"
+    );
+}
+
+#[test]
 fn bvh02_rays_along_a_face_of_the_box_of_the_rest_go_on() {
     let quad = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 2.0], [-1.0, 1.0, 2.0]];
     let wall = [[-50.0, -50.0, 9.0], [50.0, -50.0, 9.0], [0.0, 50.0, 9.0]];

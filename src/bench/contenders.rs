@@ -83,7 +83,8 @@ impl Contenders {
     /// # Errors
     /// Embree's own.
     pub fn build(backends: &[Backend], geometry: &Geometry) -> Result<Self, RenderError> {
-        let Split { all, front } = Split::new(geometry.clone());
+        let split = Split::new(geometry.clone());
+        let has_bare = split.front.is_some();
         let mut built = Self { fast: Vec::new(), linear: None, front: 0 };
         for backend in backends {
             if let Backend::Linear = backend {
@@ -94,14 +95,18 @@ impl Contenders {
                 built.front = built.front.max(accel.stats().front);
                 built.fast.push(Contender { backend: backend.name(), entry, setup, accel });
             };
-            let Some((big, rest)) = &front else {
+            let of_backend = split.clone();
+            let Split { all, front } = if let Backend::Embree(_) = backend { of_backend.apart() } else { of_backend };
+            if let Some((big, rest)) = &front {
+                for ((entry, rest), (_, all)) in entries(backend, rest)?.into_iter().zip(entries(backend, &all)?) {
+                    add((entry, Box::new(Front::new(big.clone(), Some(rest), all))), Setup::Prepared);
+                }
+            } else {
                 entries(backend, &all)?.into_iter().for_each(|entry| add(entry, Setup::Prepared));
-                continue;
-            };
-            for ((entry, rest), (_, all)) in entries(backend, rest)?.into_iter().zip(entries(backend, &all)?) {
-                add((entry, Box::new(Front::new(big.clone(), Some(rest), all))), Setup::Prepared);
             }
-            entries(backend, &all)?.into_iter().for_each(|entry| add(entry, Setup::Bare));
+            if has_bare {
+                entries(backend, &all)?.into_iter().for_each(|entry| add(entry, Setup::Bare));
+            }
         }
         Ok(built)
     }

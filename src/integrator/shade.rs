@@ -132,7 +132,8 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         Some(crossing) => crossing.eta,
         None => L::F::one(),
     };
-    let closure = closure::<L>(tables, &pool.hits, at, &si, eta, shaded);
+    let mut closure = closure::<L>(tables, &si, shaded);
+    closure.add_layers(tables, &pool.hits, at, &si, eta, shaded);
     let start = si.start();
 
     if !tables.lights.is_empty() {

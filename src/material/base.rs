@@ -9,6 +9,7 @@
 
 use super::bsdf::{BsdfValue, View};
 use super::energy::{Brdf, Energy, Row, Stretched, again};
+use super::extent::{Extent, Room};
 use super::film::Film;
 use super::lobes::fresnel::{dielectric, normal_incidence};
 use super::lobes::ggx::{Visible, distribution, masking};
@@ -28,12 +29,12 @@ pub const DELTA_ALPHA: f32 = 1e-4;
 /// Indices of refraction nearer to each other than this share are no boundary: half vectors could not be told.
 const NO_BOUNDARY: f32 = 2e-4;
 
-/// The closure below coat and sheen; directions are local. Without `RICH` there are none of the extras in it, nor any code
-/// for them.
-pub struct Base<'e, L: Lanes, const RICH: bool> {
+/// The closure below coat and sheen; directions are local. `K` says whether there
+/// is room for the extras.
+pub struct Base<'e, L: Lanes, K: Extent> {
     energy: &'e Energy,
     is_full: bool,
-    /// Normal of the diffuse lobe, unit; (0, 0, 1) but where [`Base::with_diffuse_normal`] says otherwise.
+    /// Normal of the diffuse lobe, unit; (0, 0, 1) but where [`Base::set_diffuse_normal`] says otherwise.
     diffuse_normal: V3<L>,
     /// Lanes where it does.
     is_split: L::M,
@@ -54,9 +55,16 @@ pub struct Base<'e, L: Lanes, const RICH: bool> {
     /// Roughness squared, along x and y.
     alpha: [L::F; 2],
     visible: Visible<L>,
+    /// Smith's Lambda of the viewer, `1 / (4 wo.z)`, and `1 / alpha`.
+    lambda_o: L::F,
+    quarter: L::F,
+    inverse: [L::F; 2],
+    /// Reflectance of `ior` at normal incidence, and 1 over what that leaves.
+    own: L::F,
+    left_by_own: L::F,
     /// Where the albedos of this roughness are.
     row: Row<L>,
-    stretched: Option<Stretched<L>>,
+    stretched: K::Room<Stretched<L>>,
     is_stretched: L::M,
     /// Coefficient of the diffuse lobe of light that was reflected more than once, but for its share towards `wi`.
     multiple: V3<L>,
@@ -64,8 +72,8 @@ pub struct Base<'e, L: Lanes, const RICH: bool> {
     diffuse: V3<L>,
     /// The dielectric's largest reflectance at normal incidence, and of light reflected more than once.
     layer: [L::F; 2],
-    through: Option<Through<L>>,
-    film: Option<Film<L>>,
+    through: K::Room<Through<L>>,
+    film: K::Room<Film<L>>,
     /// About the albedo towards the viewer.
     albedo: L::F,
     /// Probability of sampling the specular lobes.
@@ -94,7 +102,7 @@ pub struct BaseSample<L: Lanes> {
     pub valid: L::M,
 }
 
-impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
+impl<'e, L: Lanes, K: Extent> Base<'e, L, K> {
     /// For a surface seen so. Where `view.wo` is below the shading horizon, a surface with a specular lobe reflects
     /// nothing.
     #[inline(always)]
@@ -126,15 +134,20 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             weight: specular,
             ior,
             alpha: [smooth, smooth],
-            visible: Visible::all(wo, smooth, smooth),
+            visible: Visible::nothing(wo),
+            lambda_o: zero,
+            quarter: zero,
+            inverse: [zero, zero],
+            own: zero,
+            left_by_own: zero,
             row: Row::nowhere(),
-            stretched: None,
+            stretched: K::Room::hold(None),
             is_stretched: none,
             multiple: V3::zero(),
             diffuse: base.scale(opaque),
             layer: [zero, zero],
-            through: None,
-            film: None,
+            through: K::Room::hold(None),
+            film: K::Room::hold(None),
             albedo: base.scale(opaque).max_component(),
             specular_pmf: zero,
             behind_pmf: zero,
@@ -143,7 +156,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             is_seen,
             has_specular,
         };
-        let extras = if RICH { surface.extras.as_ref() } else { None };
+        let extras = if K::IS_RICH { surface.extras.as_ref() } else { None };
         if !has_specular && extras.is_none() {
             return base_closure;
         }
@@ -151,7 +164,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let mut share = zero;
         let mut sees_all = none;
         let mut is_none = none;
-        if RICH && let Some(extras) = extras {
+        if let Some(extras) = extras {
             share = extras.transmission;
             sees_all = share.gt(zero);
             // Where there is no boundary light goes on as it came, whatever the roughness: before any albedo is asked for.
@@ -165,13 +178,19 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                 this.alpha = [along.or_else(this.is_stretched, smooth), smooth];
                 this.is_delta = is_delta & !this.is_stretched;
                 if is_full {
-                    this.stretched = Some(energy.stretched_row::<L>(smooth, extras.anisotropy, class));
+                    this.stretched = K::Room::hold(Some(energy.stretched_row::<L>(smooth, extras.anisotropy, class)));
                 }
             }
-            this.film = Film::new(extras, f0, base, metallic);
+            this.film = K::Room::hold(Film::new(extras, f0, base, metallic));
         }
         let [ax, ay] = this.alpha;
-        this.visible = Visible::all_in(sees_all, wo, ax, ay);
+        this.visible = if K::IS_RICH { Visible::all_in(sees_all, wo, ax, ay) } else { Visible::new(wo, ax, ay) };
+        this.lambda_o = masking::<L>(wo, ax, ay);
+        this.quarter = one / (L::F::splat(4.0) * wo.z);
+        let inverse = one / ay;
+        this.inverse = [if K::IS_RICH { one / ax } else { inverse }, inverse];
+        this.own = normal_incidence::<L>(ior);
+        this.left_by_own = one / (one - this.own);
         // Albedos towards the viewer.
         this.row = energy.row::<L>((ax * ay).sqrt(), class);
         let toward = this.albedo_toward(wo);
@@ -184,7 +203,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let mut metal_toward = this.metal(wo.z);
         let mut layer_toward = (f0 + (all - f0).scale(toward[1])).scale(specular);
         let (plain_mean, plain_toward) = (layer_mean, layer_toward);
-        if RICH && let Some(film) = &this.film {
+        if let Some(film) = this.film.get() {
             (metal_mean, layer_mean) = film.average(this.mean_shares(), metal_mean, layer_mean, specular);
             (metal_toward, layer_toward) = film.average(this.shares(wo), metal_toward, layer_toward, specular);
         }
@@ -199,7 +218,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
             this.layer = [f0.max_component() * specular, layer_again.max_component()];
             shadowed = all.scale(layer_toward.max_component() * white + this.layer[1] * lost);
             shadowed_mean = all.scale(layer_mean.max_component() * mean + this.layer[1] * (one - mean));
-            if RICH && let Some(film) = &mut this.film {
+            if let Some(film) = this.film.get_mut() {
                 let again = film.set_again(layer_again);
                 shadowed = film.taken(layer_toward, plain_toward).scale(white) + again.scale(lost);
                 shadowed_mean = film.taken(layer_mean, plain_mean).scale(mean) + again.scale(one - mean);
@@ -208,7 +227,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         } else {
             this.diffuse = this.diffuse.scale(one - share);
         }
-        if RICH && let Some(extras) = extras {
+        if let Some(extras) = extras {
             let behind = extras.diffuse_transmission;
             if (share.gt(zero) | behind.gt(zero)).any() {
                 let is_volume = extras.is_volume & share.gt(zero);
@@ -227,9 +246,9 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                 let white = Self::left(shadowed, shadowed_mean).scale(opaque * (one - share));
                 let tinted = extras.diffuse_transmission_color * white;
                 // The boundary's reflectance against what is before it, with the colour it has against air.
-                let own = normal_incidence::<L>(ior).max(L::F::splat(1e-12));
+                let own = this.own.max(L::F::splat(1e-12));
                 let f0 = f0.scale(normal_incidence::<L>(eta) / own).min(V3::splat([1.0; 3]));
-                this.through = Some(Through {
+                this.through = K::Room::hold(Some(Through {
                     f0,
                     tint: base,
                     share,
@@ -239,14 +258,14 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
                     is_none,
                     diffuse: tinted.scale(behind),
                     has_behind: behind.gt(zero),
-                });
+                }));
                 this.diffuse = this.diffuse.scale(one - behind);
             }
         }
         // Shares of the albedo at this angle.
         let reflected = metal_toward.scale(metallic * white) + layer_toward.scale(opaque * white);
         let (mut passed, mut behind) = (V3::zero(), V3::zero());
-        if RICH && let Some(through) = &this.through {
+        if let Some(through) = this.through.get() {
             passed = through.tint.scale(opaque * share * (one - layer_toward.max_component()));
             behind = through.diffuse * (all - shadowed_mean);
         }
@@ -259,13 +278,13 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         base_closure
     }
 
-    /// The same with the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the
-    /// specular one's normal may have been bent for its mirror's sake, which is no matter of the diffuse one.
+    /// Puts the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the specular
+    /// one's normal may have been bent for its mirror's sake, which is no matter of the diffuse one.
     #[inline(always)]
-    pub fn with_diffuse_normal(self, frame: &Frame<L>, normal: V3<L>, lanes: L::M) -> Self {
+    pub fn set_diffuse_normal(&mut self, frame: &Frame<L>, normal: V3<L>, lanes: L::M) {
         let lanes = lanes & !self.is_diffuse;
-        let normal = frame.to_local(normal).normalized().or_else(lanes, self.diffuse_normal);
-        Self { diffuse_normal: normal, is_split: lanes, has_split: lanes.any(), ..self }
+        self.diffuse_normal = frame.to_local(normal).normalized().or_else(lanes, self.diffuse_normal);
+        (self.is_split, self.has_split) = (lanes, lanes.any());
     }
 
     /// Cosine between `wi` and the diffuse lobe's normal.
@@ -288,21 +307,22 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let all = V3::<L>::splat([1.0; 3]);
         let c = c.max(zero);
         let s5 = pow5((one - c).max(zero));
-        let rise = self.rise(c, self.ior, s5);
+        let rise = self.rise(c, s5);
         let mut metal = self.base + (all - self.base).scale(s5);
         let mut layer = (self.f0 + (all - self.f0).scale(rise)).scale(self.weight).max(V3::zero());
         let mut boundary = layer;
-        if RICH && let Some(through) = &self.through {
+        if let Some(through) = self.through.get() {
             let eta = through.eta;
-            let rise = self.rise(c, eta, s5);
+            let own = normal_incidence::<L>(eta);
+            let rise = self.rise_of(eta, [own, one / (one - own)], c, s5);
             let bent = (through.f0 + (all - through.f0).scale(rise)).scale(self.weight).max(V3::zero());
             // Beyond the critical angle everything is reflected, whatever the material says.
             let is_total = eta.lt(one) & (c * c + (eta - one) * (eta + one)).le(zero);
             boundary = all.or_else(is_total, bent).or_else(through.is_volume & self.ior.gt(zero), layer);
         }
-        if RICH && let Some(film) = &self.film {
+        if let Some(film) = self.film.get() {
             (metal, layer) = film.fresnel(c, metal, layer, self.weight);
-            if let Some(through) = &self.through {
+            if let Some(through) = self.through.get() {
                 boundary = boundary.or_else(through.is_volume, layer);
             }
         }
@@ -311,14 +331,19 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
 
     /// How far Fresnel's curve has risen at cosine `c`, where Schlick says `s5`.
     #[inline(always)]
-    fn rise(&self, c: L::F, ior: L::F, s5: L::F) -> L::F {
+    fn rise(&self, c: L::F, s5: L::F) -> L::F {
+        self.rise_of(self.ior, [self.own, self.left_by_own], c, s5)
+    }
+
+    /// The same for another index than the material's; `own` as [`Self::own`] and [`Self::left_by_own`].
+    #[inline(always)]
+    fn rise_of(&self, ior: L::F, own: [L::F; 2], c: L::F, s5: L::F) -> L::F {
         let (zero, one) = (L::F::zero(), L::F::one());
         if self.is_full {
-            let own = normal_incidence::<L>(ior);
-            let exact = (dielectric::<L>(c, ior) - own) / (one - own);
+            let exact = (dielectric::<L>(c, ior) - own[0]) * own[1];
             return zero.or_else(ior.eq(one), exact).or_else(ior.gt(zero), s5);
         }
-        if !RICH {
+        if !K::IS_RICH {
             return s5;
         }
         // From the dense side it is the cosine on the other one that counts.
@@ -332,7 +357,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let one = L::F::one();
         let (metal, layer, boundary) = self.fresnel(c);
         let opaque = one - self.metallic;
-        let Some(through) = self.through.as_ref().filter(|_| RICH) else {
+        let Some(through) = self.through.get() else {
             return (metal.scale(self.metallic) + layer.scale(opaque), V3::zero(), layer);
         };
         let kept = layer.scale(one - through.share);
@@ -340,7 +365,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let all = V3::<L>::splat([1.0; 3]);
         let mut taken = all.scale(boundary.max_component());
         if self.is_full
-            && let Some(film) = &self.film
+            && let Some(film) = self.film.get()
         {
             taken = taken.or_else(through.is_volume, film.taken(boundary, boundary));
         }
@@ -353,7 +378,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     #[inline(always)]
     fn reflects(&self, reflected: V3<L>, passed: V3<L>) -> L::F {
         let (r, p) = (reflected.max_component(), passed.max_component());
-        if RICH && self.through.is_some() { r / (r + p).max(L::F::splat(1e-30)) } else { L::F::one() }
+        if self.through.get().is_some() { r / (r + p).max(L::F::splat(1e-30)) } else { L::F::one() }
     }
 
     /// Value and density for `wi`; each lobe is zero beyond its horizon.
@@ -361,7 +386,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     pub fn eval(&self, wi: V3<L>) -> BsdfValue<L> {
         let (zero, one) = (L::F::zero(), L::F::one());
         let cosine_pdf = self.diffuse_cosine(wi).max(zero) * L::F::splat(FRAC_1_PI);
-        if !(self.has_specular || RICH && self.through.is_some()) {
+        if !(self.has_specular || self.through.get().is_some()) {
             return BsdfValue { f_cos: self.diffuse.scale(cosine_pdf), pdf: cosine_pdf };
         }
         let cosine_pdf = cosine_pdf.masked(self.is_seen);
@@ -372,10 +397,9 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let c = self.wo.dot(h);
         let (reflected, passed, layer) = self.at_half(c);
         let [ax, ay] = self.alpha;
-        let d = distribution::<L>(h, ax, ay);
-        let lambda_o = masking::<L>(self.wo, ax, ay);
-        let g2 = one / (one + lambda_o + masking::<L>(up, ax, ay));
-        let specular = reflected.scale(d * g2 / (L::F::splat(4.0) * self.wo.z)).masked(glossy);
+        let d = distribution::<L>(h, self.inverse);
+        let g2 = one / (one + self.lambda_o + masking::<L>(up, ax, ay));
+        let specular = reflected.scale(d * g2 * self.quarter).masked(glossy);
         let specular_pdf = (self.visible.pdf_reflected(d) * self.reflects(reflected, passed)).masked(glossy);
         // What the layer leaves of the light that comes in, and gives back after the first reflection.
         let mut diffuse = self.diffuse;
@@ -388,14 +412,14 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         }
         let diffuse = self.diffuse_only(diffuse);
         let mut diffuse_pmf = one - self.specular_pmf;
-        if RICH && self.through.is_some() {
+        if self.through.get().is_some() {
             diffuse_pmf = diffuse_pmf - self.behind_pmf;
         }
         let f_cos = diffuse.scale(cosine_pdf) + specular;
         let pdf = (diffuse_pmf * cosine_pdf + self.specular_pmf * specular_pdf).max(zero);
         let value = BsdfValue { f_cos, pdf };
-        match &self.through {
-            Some(through) if RICH && (!above).any() => self.behind(wi, through, lambda_o, value),
+        match self.through.get() {
+            Some(through) if (!above).any() => self.behind(wi, through, value),
             _ => value,
         }
     }
@@ -408,7 +432,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
 
     /// `value` with what goes through in the lanes where `wi` is below the horizon.
     #[inline(always)]
-    fn behind(&self, wi: V3<L>, through: &Through<L>, lambda_o: L::F, value: BsdfValue<L>) -> BsdfValue<L> {
+    fn behind(&self, wi: V3<L>, through: &Through<L>, value: BsdfValue<L>) -> BsdfValue<L> {
         let (zero, one) = (L::F::zero(), L::F::one());
         let below = wi.z.lt(zero) & self.is_seen;
         let down = V3::<L>::new(wi.x, wi.y, wi.z.min(L::F::splat(-1e-12)));
@@ -421,8 +445,8 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let h = bent.or_else(through.is_volume, thin).normalized();
         let (co, ci) = (self.wo.dot(h), down.dot(h));
         let (reflected, passed, _) = self.at_half(co);
-        let d = distribution::<L>(h, ax, ay);
-        let g2 = one / (one + lambda_o + masking::<L>(down, ax, ay));
+        let d = distribution::<L>(h, self.inverse);
+        let g2 = one / (one + self.lambda_o + masking::<L>(down, ax, ay));
         // Both cosines lie on their own sides of the half vector, or nothing is refracted so.
         let refracts = co.gt(zero) & ci.lt(zero);
         let sum = co + through.eta * ci;
@@ -430,7 +454,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let jacobian = eta2 * ci.abs() / (sum * sum).max(L::F::splat(1e-30));
         let glossy = below & !self.is_delta & (refracts | !through.is_volume);
         // Radiance is denser in the denser medium: / eta^2.
-        let thin_value = d * g2 / (L::F::splat(4.0) * self.wo.z);
+        let thin_value = d * g2 * self.quarter;
         let bent_value = d * g2 * co * jacobian / (self.wo.z * eta2);
         let specular = passed.scale(bent_value.or_else(through.is_volume, thin_value)).masked(glossy);
         let bent_pdf = self.visible.pdf_normal(d, co) * jacobian;
@@ -448,7 +472,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     /// What goes straight through; see [`super::bsdf::Bsdf::straight`].
     #[inline(always)]
     pub fn straight(&self) -> V3<L> {
-        let Some(through) = self.through.as_ref().filter(|_| RICH) else { return V3::zero() };
+        let Some(through) = self.through.get() else { return V3::zero() };
         let (_, passed, _) = self.at_half(self.wo.z);
         passed.masked(self.is_delta & self.is_seen & !through.is_volume)
     }
@@ -465,7 +489,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         if self.has_split {
             diffuse = Frame::around(self.diffuse_normal).to_world(diffuse).or_else(self.is_split, diffuse);
         }
-        if !(self.has_specular || RICH && self.through.is_some()) {
+        if !(self.has_specular || self.through.get().is_some()) {
             let valid = diffuse.z.gt(zero);
             return BaseSample {
                 wi: diffuse,
@@ -481,13 +505,15 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
         let h = V3::<L>::new(zero, zero, one).or_else(self.is_delta, h);
         let c = self.wo.dot(h);
         let mirrored = h.scale(c + c) - self.wo;
-        let (reflected, passed, _) = self.at_half(c);
+        // Of lobes with a width the weight is `eval`'s.
+        let asks = self.is_delta.any() || self.through.get().is_some();
+        let (reflected, passed, _) = if asks { self.at_half(c) } else { (V3::zero(), V3::zero(), V3::zero()) };
         let mut wi = mirrored.or_else(from_specular, diffuse);
         let mut delta_weight = reflected.scale(one / self.specular_pmf);
         // A specular sample below its horizon is lost, even where the diffuse lobe reaches.
         let mut valid = wi.z.gt(zero) | !from_specular;
         let (mut transmitted, mut straight) = (none, none);
-        if RICH && let Some(through) = &self.through {
+        if let Some(through) = self.through.get() {
             let reflects = self.reflects(reflected, passed);
             let passes = from_specular & !(u_lobe.lt(self.specular_pmf * reflects));
             let behind = !from_specular & u_lobe.lt(self.specular_pmf + self.behind_pmf);
@@ -523,7 +549,7 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     /// Colour of the diffuse lobe of lanes that have no other: their weight, exactly.
     #[inline(always)]
     pub fn only_diffuse(&self) -> (V3<L>, L::M) {
-        match &self.through {
+        match self.through.get() {
             Some(through) => (self.diffuse, self.is_diffuse & !through.has_behind),
             None => (self.diffuse, self.is_diffuse),
         }
@@ -538,6 +564,6 @@ impl<'e, L: Lanes, const RICH: bool> Base<'e, L, RICH> {
     /// Whether some lane has more than a diffuse lobe.
     #[inline(always)]
     pub fn has_specular(&self) -> bool {
-        self.has_specular || self.through.is_some()
+        self.has_specular || self.through.get().is_some()
     }
 }

@@ -4,12 +4,13 @@
 
 use super::Base;
 use crate::material::energy::{FILM_NODES, Row};
+use crate::material::extent::{Extent, Room};
 use crate::material::film::tilted;
 use crate::math::V3;
 use crate::math::lanes::{lerp, pow5};
-use simd::{Float, Lanes};
+use simd::{Float, Lanes, Mask};
 
-impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
+impl<L: Lanes, K: Extent> Base<'_, L, K> {
     /// Albedo of GGX reflecting everything, and the rise of Fresnel's curve, towards `w` (w.z > 0).
     #[inline(always)]
     pub(super) fn albedo_toward(&self, w: V3<L>) -> [L::F; 2] {
@@ -18,14 +19,17 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
         }
         let found = self.energy.albedo::<L>(&self.row, w.z);
         let (mut white, mut found_rise) = (found.white, found.rise);
-        if RICH && let Some(stretched) = &self.stretched {
+        if let Some(stretched) = self.stretched.get() {
             let [own, schlick] = self.energy.stretched::<L>(stretched, w);
             let own_rise = self.energy.stretched_rise::<L>(&self.row_toward(w), w.z, schlick);
             (white, found_rise) =
                 (own.or_else(self.is_stretched, white), own_rise.or_else(self.is_stretched, found_rise));
         }
+        if !self.is_delta.any() {
+            return [white, found_rise];
+        }
         // A mirror's curve is Fresnel's own.
-        let rise = self.rise(w.z, self.ior, pow5(L::F::one() - w.z.min(L::F::one())));
+        let rise = self.rise(w.z, pow5(L::F::one() - w.z.min(L::F::one())));
         [L::F::one().or_else(self.is_delta, white), rise.or_else(self.is_delta, found_rise)]
     }
 
@@ -33,27 +37,27 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
     /// counts for the cosines between them.
     #[inline(always)]
     pub(super) fn row_toward(&self, w: V3<L>) -> Row<L> {
-        match &self.stretched {
-            Some(stretched) if RICH => self.energy.row_at::<L>(&self.row, stretched.toward(w)),
-            _ => self.row,
+        match self.stretched.get() {
+            Some(stretched) => self.energy.row_at::<L>(&self.row, stretched.toward(w)),
+            None => self.row,
         }
     }
 
     /// Mean of the albedo of GGX reflecting everything.
     #[inline(always)]
     pub(super) fn mean(&self) -> L::F {
-        match &self.stretched {
-            Some(stretched) if RICH => stretched.mean.or_else(self.is_stretched, self.row.mean),
-            _ => self.row.mean,
+        match self.stretched.get() {
+            Some(stretched) => stretched.mean.or_else(self.is_stretched, self.row.mean),
+            None => self.row.mean,
         }
     }
 
     /// Mean of the rise of Fresnel's curve.
     #[inline(always)]
     pub(super) fn mean_rise(&self) -> L::F {
-        match &self.stretched {
-            Some(stretched) if RICH => stretched.mean_rise.or_else(self.is_stretched, self.row.mean_rise),
-            _ => self.row.mean_rise,
+        match self.stretched.get() {
+            Some(stretched) => stretched.mean_rise.or_else(self.is_stretched, self.row.mean_rise),
+            None => self.row.mean_rise,
         }
     }
 
@@ -61,7 +65,7 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
     #[inline(always)]
     pub(super) fn shares(&self, w: V3<L>) -> [L::F; FILM_NODES] {
         let shares = self.energy.film_shares::<L>(&self.row_toward(w), w.z);
-        let Some(stretched) = &self.stretched else { return shares };
+        let Some(stretched) = self.stretched.get() else { return shares };
         tilted::<L>(shares, self.energy.stretched::<L>(stretched, w)[1])
     }
 
@@ -69,7 +73,7 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
     #[inline(always)]
     pub(super) fn mean_shares(&self) -> [L::F; FILM_NODES] {
         let shares = self.energy.film_mean_shares::<L>(&self.row);
-        let Some(stretched) = &self.stretched else { return shares };
+        let Some(stretched) = self.stretched.get() else { return shares };
         tilted::<L>(shares, stretched.mean_schlick)
     }
 
@@ -87,7 +91,7 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
     fn left_of(shadowed: L::F, mean: L::F) -> L::F {
         let one = L::F::one();
         let left = (one - shadowed) / (one - mean).max(L::F::splat(1e-4));
-        if RICH { left.max(L::F::zero()) } else { left }
+        if K::IS_RICH { left.max(L::F::zero()) } else { left }
     }
 
     /// What the specular layer leaves of light from `wi` for the diffuse base, in addition to the viewer's.
@@ -98,12 +102,12 @@ impl<L: Lanes, const RICH: bool> Base<'_, L, RICH> {
         let [white, rise] = albedo;
         let [f0, again] = self.layer;
         let layer = lerp(f0, self.weight, rise);
-        if RICH && let Some(film) = &self.film {
+        if let Some(film) = self.film.get() {
             let taken = film.toward(self.shares(wi), layer, self.weight);
             // A film's shares add up to 1 but for rounding.
             return (all - taken.scale(white) - film.again().scale(one - white)).max(V3::zero());
         }
         let left = one - layer * white - again * (one - white);
-        all.scale(if RICH { left.max(L::F::zero()) } else { left })
+        all.scale(if K::IS_RICH { left.max(L::F::zero()) } else { left })
     }
 }

@@ -6,6 +6,7 @@
 use super::base::Base;
 pub use super::base::DELTA_ALPHA;
 use super::energy::Energy;
+use super::extent::Plain;
 use super::layered::Layered;
 use super::surface::Surface;
 use crate::math::{Frame, V3};
@@ -15,7 +16,7 @@ use simd::{Float, Lanes, Mask, Part, Scalar};
 pub struct Bsdf<'e, L: Lanes> {
     /// Local frame about the shading normal.
     pub frame: Frame<L>,
-    base: Base<'e, L, false>,
+    base: Base<'e, L, Plain>,
     /// Lanes that are shaded on their own.
     layered: Vec<(usize, Layered<'e>)>,
 }
@@ -75,22 +76,23 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
         Self { frame: view.frame, base: Base::new(surface, view, energy), layered: Vec::new() }
     }
 
-    /// The same, but for the lanes that are closures of their own.
+    /// Makes lanes closures of their own.
     #[inline(always)]
-    pub fn with_layered(self, layered: Vec<(usize, Layered<'e>)>) -> Self {
+    pub fn set_layered(&mut self, layered: Vec<(usize, Layered<'e>)>) {
         let mut normals = Spread::of(self.frame.z);
         for (lane, closure) in &layered {
             normals.set(*lane, closure.frame().z);
         }
         // Nobody asks for the other axes of these lanes.
-        Self { frame: Frame { z: normals.join(), ..self.frame }, layered, ..self }
+        self.frame.z = normals.join();
+        self.layered = layered;
     }
 
-    /// The same with the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the
-    /// specular one's normal may have been bent for its mirror's sake, which is no matter of the diffuse one.
+    /// Puts the diffuse lobe about the world normal `normal` (unit) in those of `lanes` that have two lobes: the specular
+    /// one's normal may have been bent for its mirror's sake, which is no matter of the diffuse one.
     #[inline(always)]
-    pub fn with_diffuse_normal(self, normal: V3<L>, lanes: L::M) -> Self {
-        Self { base: self.base.with_diffuse_normal(&self.frame, normal, lanes), ..self }
+    pub fn set_diffuse_normal(&mut self, normal: V3<L>, lanes: L::M) {
+        self.base.set_diffuse_normal(&self.frame, normal, lanes);
     }
 
     /// Value and density for world direction `wi`; each lobe is zero beyond its horizon.
@@ -191,7 +193,7 @@ impl<'e, L: Lanes> Bsdf<'e, L> {
 
 /// [`Base::eval`], which is called for the light's direction and for the sampled one.
 struct EvalBase<'a, 'e, L: Lanes> {
-    base: &'a Base<'e, L, false>,
+    base: &'a Base<'e, L, Plain>,
     wi: V3<L>,
 }
 

@@ -90,7 +90,9 @@ fn bsdf_03_sample_weight_and_pdf_are_those_of_eval() {
 fn split<L: Lanes>(surface: [f32; 4], cos: f32, tilt: f32) -> Bsdf<'static, L> {
     let (sin, z) = tilt.sin_cos();
     let normal = V3::<L>::splat([sin * 1f32.cos(), sin * 1f32.sin(), z]);
-    bsdf::<L>(surface, cos).with_diffuse_normal(normal, L::M::first(L::N))
+    let mut bsdf = bsdf::<L>(surface, cos);
+    bsdf.set_diffuse_normal(normal, L::M::first(L::N));
+    bsdf
 }
 
 #[test]

@@ -7,6 +7,7 @@
 use super::base::Base;
 use super::bsdf::{BsdfSample, BsdfValue, View};
 use super::energy::Energy;
+use super::extent::Rich;
 use super::lobes::coat::Coat;
 use super::lobes::disney::Disney;
 use super::lobes::sheen::Sheen;
@@ -30,7 +31,7 @@ pub struct Layered<'e> {
 
 /// What lies lowest.
 enum Ground<'e> {
-    Base(Box<Base<'e, Scalar, true>>),
+    Base(Box<Base<'e, Scalar, Rich>>),
     Disney(Box<Disney<Scalar>>),
 }
 
@@ -71,7 +72,7 @@ impl<'e> Layered<'e> {
             None => {
                 let mut base = Base::new(surface, view, energy);
                 if let Some(normal) = diffuse_normal {
-                    base = base.with_diffuse_normal(&frame, normal, M::first(1));
+                    base.set_diffuse_normal(&frame, normal, M::first(1));
                 }
                 let albedo = base.albedo();
                 (Ground::Base(Box::new(base)), albedo)

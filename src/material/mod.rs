@@ -5,6 +5,7 @@ pub mod bsdf;
 mod bump;
 pub mod energy;
 pub mod extensions;
+mod extent;
 mod features;
 mod film;
 pub mod layered;

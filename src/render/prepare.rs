@@ -462,12 +462,12 @@ pub fn build_accel(
         let report = report(&*accel, requested, String::new());
         return Ok((accel, report));
     }
-    let Split { all, front } = Split::new(geometry);
+    let split = Split::new(geometry);
     let (library, note) = match settings.accel {
         AccelChoice::Linear | AccelChoice::Bvh => (None, String::new()),
         AccelChoice::Embree => (Some(embree::find(&settings.embree_dirs)?), String::new()),
         // Opening libembree4 costs tens of milliseconds, for nothing.
-        AccelChoice::Auto if front.as_ref().is_some_and(|(big, _)| big.is_all()) => {
+        AccelChoice::Auto if split.front.as_ref().is_some_and(|(big, _)| big.is_all()) => {
             (None, String::from("every triangle is tested in packets, so no Embree is needed"))
         }
         AccelChoice::Auto => match embree::find(&settings.embree_dirs) {
@@ -481,6 +481,7 @@ pub fn build_accel(
             None => Box::new(WideBvh::build(geometry)),
         })
     };
+    let Split { all, front } = if library.is_some() { split.apart() } else { split };
     let accel = match front {
         Some(front) => Box::new(Front::build(all, front, build)?),
         None => build(all)?,

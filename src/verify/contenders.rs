@@ -115,7 +115,8 @@ pub fn contenders(
         let accel: Arc<dyn Accel> = build(geometry.clone())?.into();
         all.push(Contender { name: names[0], backend, accel: Arc::clone(&accel), is_coherent: false });
         all.push(Contender { name: names[1], backend, accel, is_coherent: true });
-        let Split { all: everything, front } = Split::new(geometry.clone());
+        let split = Split::new(geometry.clone());
+        let Split { all: everything, front } = if backend == Backend::Embree { split.apart() } else { split };
         if let Some(front) = front {
             let front = Front::build(everything, front, build)?;
             all.push(Contender { name: names[2], backend, accel: Arc::new(front), is_coherent: false });

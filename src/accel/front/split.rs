@@ -5,6 +5,9 @@ use crate::accel::woop::can_be_hit;
 use std::collections::HashMap;
 use std::sync::Arc;
 
+#[path = "edges.rs"]
+mod edges;
+
 /// More triangles than this are no short list.
 pub const MOST: usize = 64;
 
@@ -23,6 +26,7 @@ pub const MOST_TWICE: usize = 1 << 19;
 const FARTHEST: f32 = 1e12;
 
 /// Which triangles of a scene go into the front, and what is left.
+#[derive(Clone)]
 pub struct Split {
     /// Everything.
     pub all: Geometry,
@@ -59,6 +63,23 @@ impl Split {
         let all = all.into();
         let chosen = choose(&all);
         let front = (!chosen.is_empty()).then(|| part(&all, &chosen));
+        Self { all, front }
+    }
+
+    /// For a backend whose arithmetic is not the front's: without those that share an edge with what is left. By each
+    /// arithmetic a mesh has no gap, but a ray at an edge may pass its two triangles if one is tested by the one and one
+    /// by the other: of 20,000 rays aimed at edges of a glass table of 592 triangles 15 did.
+    pub fn apart(self) -> Self {
+        let Self { all, front } = self;
+        if front.as_ref().is_none_or(|(big, _)| big.is_all()) {
+            return Self { all, front };
+        }
+        let chosen = choose(&all);
+        let kept = edges::apart(&all, &chosen);
+        if kept.len() == chosen.len() {
+            return Self { all, front };
+        }
+        let front = (!kept.is_empty()).then(|| part(&all, &kept));
         Self { all, front }
     }
 }

@@ -93,7 +93,8 @@ impl<L: Lanes> Coat<L> {
         let wi = V3::<L>::new(wi.x, wi.y, wi.z.max(L::F::splat(1e-12)));
         let h = (self.wo + wi).normalized();
         let fresnel = reflectance::<L>(self.wo.dot(h));
-        let d = ggx::distribution(h, self.alpha, self.alpha);
+        let inverse = one / self.alpha;
+        let d = ggx::distribution(h, [inverse, inverse]);
         let lambda = ggx::masking(self.wo, self.alpha, self.alpha) + ggx::masking(wi, self.alpha, self.alpha);
         let f_cos = self.factor * self.boost * fresnel * d / ((one + lambda) * L::F::splat(4.0) * self.wo.z);
         let f_cos = f_cos.masked(glossy);

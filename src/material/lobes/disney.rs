@@ -132,7 +132,7 @@ impl<L: Lanes> Disney<L> {
         let ss = f(1.25) * (fss * (one / (mu_o + mu_i) - f(0.5)) + f(0.5));
         let base = (ss - fd).mul_add(self.subsurface, fd) * f(FRAC_1_PI);
         // Specular: GTR of power 2 is GGX; each masking has its share of 1 / (4 cos cos).
-        let d_specular = ggx::distribution(h, self.ax, self.ay);
+        let d_specular = ggx::distribution(h, [one / self.ax, one / self.ay]);
         let g = self.masking(self.wo) * self.masking(wi);
         let specular = self.f0 + (V3::<L>::splat([1.0; 3]) - self.f0).scale(fresnel_h);
         // Clearcoat: index 1.5.

@@ -11,14 +11,14 @@ use crate::math::lanes::{cos_sin_2pi, safe_sqrt};
 use simd::{Float, Lanes};
 use std::f32::consts::FRAC_1_PI;
 
-/// Density of normals D(h) at the unit vector `h`, 1/sr: its integral times `h.z` is 1.
+/// Density of normals D(h) at the unit vector `h`, 1/sr: its integral times `h.z` is 1. `inverse` is 1 over `ax` and `ay`.
 ///
 /// In the form of the half vector's x, y, z: the textbook form of `h.z` alone loses 12 % at alpha 0.001, this one 7e-7.
 #[inline(always)]
-pub fn distribution<L: Lanes>(h: V3<L>, ax: L::F, ay: L::F) -> L::F {
-    let (x, y) = (h.x / ax, h.y / ay);
+pub fn distribution<L: Lanes>(h: V3<L>, inverse: [L::F; 2]) -> L::F {
+    let (x, y) = (h.x * inverse[0], h.y * inverse[1]);
     let e = x.mul_add(x, y.mul_add(y, h.z * h.z));
-    L::F::splat(FRAC_1_PI) / (ax * ay * e * e)
+    L::F::splat(FRAC_1_PI) * (inverse[0] * inverse[1]) / (e * e)
 }
 
 /// Smith's Lambda of direction `w`: `1 / (1 + Lambda(wo) + Lambda(wi))` of the normals are seen from both, by
@@ -62,6 +62,13 @@ impl<L: Lanes> Visible<L> {
     #[inline(always)]
     pub fn all(wo: V3<L>, ax: L::F, ay: L::F) -> Self {
         Self::with_cap(wo, ax, ay, L::F::zero())
+    }
+
+    /// Of a surface without such a lobe, whom nobody asks.
+    #[inline(always)]
+    pub fn nothing(wo: V3<L>) -> Self {
+        let (zero, one) = (L::F::zero(), L::F::one());
+        Self { wo, ax: one, ay: one, left_out: zero, divisor: one }
     }
 
     /// [`Visible::all`] in `lanes`, [`Visible::new`] in the others.

@@ -43,7 +43,7 @@ fn bsdf_09_sampled_normals_are_usable_at_every_edge() {
                                     assert!(cos_h >= 0.0 || z < 0.0, "{place}: wo.h {cos_h}");
                                     let wi = h.scale(L::F::splat(2.0 * cos_h)) - wo;
                                     assert_eq!(wi.is_finite().bits() & 1, 1, "{place}: wi");
-                                    let d = distribution(h, L::F::splat(ax), L::F::splat(ay));
+                                    let d = distribution(h, [L::F::splat(1.0 / ax), L::F::splat(1.0 / ay)]);
                                     let pdf = visible.pdf_reflected(d).first();
                                     assert!(pdf >= 0.0 && (pdf.is_finite() || z <= 0.0), "{place}: pdf {pdf}");
                                     if z > 0.0 {
@@ -116,7 +116,7 @@ impl Kernel for Bins {
                 let one = L::F::one();
                 let q = [one / (one - t[0].abs()), one / (one - t[1].abs())];
                 let h = V3::<L>::new(ax * t[0] * q[0], ay * t[1] * q[1], one).normalized();
-                let d = distribution(h, ax, ay);
+                let d = distribution(h, [L::F::one() / ax, L::F::one() / ay]);
                 let pdf = visible.pdf_normal(d, wo.dot(h).max(L::F::zero()));
                 // dh = h.z^3 ax ay ds.
                 let jacobian = h.z * h.z * h.z * ax * ay * q[0] * q[0] * q[1] * q[1];
@@ -179,7 +179,7 @@ fn ggx_at_alpha_1_has_its_closed_form() {
             let one = L::F::one();
             for (a, b) in [(1.0, 1.0), (0.9, 0.1), (0.3, 0.02)] {
                 let (wo, wi) = (V3::<L>::splat(unit(a, 0.2)), V3::<L>::splat(unit(b, 2.5)));
-                let d = distribution((wo + wi).normalized(), one, one);
+                let d = distribution((wo + wi).normalized(), [one, one]);
                 let g2 = one / (one + masking(wo, one, one) + masking(wi, one, one));
                 let f = (d * g2).first() / (4.0 * a * b);
                 let expected = 1.0 / (std::f32::consts::TAU * (a + b));
