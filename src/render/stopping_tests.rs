@@ -69,6 +69,8 @@ fn a_target_is_looked_for_at_powers_of_two_and_halfway_between_them() {
     // Never before 64, however small the error.
     assert_eq!(run(waves(1024, Some(1.0), None), 1.0, look), (vec![0, 32, 64], StoppedBy::TargetError));
     assert_eq!(run(waves(16, Some(1.0), None), 1.0, look), (vec![0, 16], StoppedBy::Spp));
+    let few = run(waves(1024, Some(1.0), Some(46.0)), 1.0, look);
+    assert_eq!(few, (vec![0, 1, 2, 4, 8, 16, 32, 45], StoppedBy::TimeLimit));
 }
 
 #[test]
