@@ -180,7 +180,8 @@ fn check_stopping(spp: u32, report: &ImageReport, then: &Fingerprint, wanted: &W
     let then = then.stopping.clone().filter(|_| is_open).unwrap_or_else(|| fixed(spp));
     let has_target = then.target_error == now.target_error;
     let has_all = spp == now.spp && (now.target_error.is_none() || has_target);
-    let is_good = report.stopped_by.as_deref() == Some("target-error") && has_target && spp <= now.spp;
+    let was_good = now.target_error.is_some() && report.stopped_by.as_deref() == Some("target-error");
+    let is_good = was_good && has_target && spp <= now.spp;
     if has_all || is_good {
         return Ok(());
     }
