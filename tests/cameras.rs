@@ -6,7 +6,7 @@ use glam::{DMat4, DQuat, DVec3};
 use prt::camera::{Camera, Projection, look_at};
 use prt::image::exr::{ExrCamera, ExrOptions, ExrPicture, ExrProjection, encode};
 use prt::material::Material;
-use prt::render::{AccelChoice, Filter, Frame, Progress, RenderSettings, render};
+use prt::render::{AccelChoice, Filter, FilterShape, Frame, Progress, RenderSettings, render};
 use prt::scene::{Scene, SceneBuilder};
 use prt::texture::Param;
 use support::scenes::add_quad;
@@ -44,7 +44,7 @@ fn picture(scene: &Scene) -> Frame {
         height: HEIGHT,
         spp: 16,
         max_bounces: Some(0),
-        filter: Filter::Box { width: 1.0 },
+        filter: Filter { shape: FilterShape::Box, width: 1.0 },
         accel: AccelChoice::Bvh,
         ..RenderSettings::default()
     };

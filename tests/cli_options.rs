@@ -45,6 +45,22 @@ fn what_is_not_wanted_is_not_written() {
 }
 
 #[test]
+fn every_pixel_filter_makes_a_picture_of_its_own() {
+    let root = folder();
+    let mut pictures = Vec::new();
+    for filter in ["box", "tent", "gaussian", "blackman-harris", "gaussian:2", "blackman-harris:1.5"] {
+        prt_in(root.path(), &[&SMALL[..], &["--filter", filter]].concat());
+        let picture = fs::read(root.path().join("renders/a.exr")).unwrap();
+        assert!(!pictures.contains(&picture), "{filter}");
+        pictures.push(picture);
+    }
+    // The usual width is that of nothing said.
+    prt_in(root.path(), &[&SMALL[..], &["--filter", "gaussian"]].concat());
+    let output = prt_in(root.path(), &[&SMALL[..], &["--filter", "gaussian:3"]].concat());
+    assert!(stderr(&output).contains("up to date"), "{}", stderr(&output));
+}
+
+#[test]
 fn a_picture_that_was_not_wanted_the_last_time_is_made_now() {
     let root = folder();
     prt_in(root.path(), &[&SMALL[..], &["--no-exr"]].concat());

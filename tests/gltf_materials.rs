@@ -6,7 +6,7 @@ use gltf_support::{Sample, base64, png};
 use prt::camera::Projection;
 use prt::error::LoadError;
 use prt::material::{AlphaMode, Material};
-use prt::render::{Filter, Progress, RenderSettings, render};
+use prt::render::{Filter, FilterShape, Progress, RenderSettings, render};
 use prt::scene::Scene;
 use prt::texture::{Few, Texels, UvTransform};
 use serde_json::{Value, json};
@@ -242,7 +242,7 @@ fn reds(texture: Value, file: &[u8], size: u32) -> Vec<u32> {
         width: size,
         height: size,
         spp: 4,
-        filter: Filter::Box { width: 1.0 },
+        filter: Filter { shape: FilterShape::Box, width: 1.0 },
         accel: prt::render::AccelChoice::Bvh,
         ..RenderSettings::default()
     };

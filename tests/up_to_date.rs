@@ -14,7 +14,7 @@ use prt::batch::{CameraSource, EnvironmentOrigin, FileSettings, PictureSize, Vie
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::{LoadOptions, load, obj::ObjUp};
-use prt::render::{AccelChoice, CropWindow, DefaultLight, Filter};
+use prt::render::{AccelChoice, CropWindow, DefaultLight, Filter, FilterShape};
 use prt::scene::Scene;
 use serde_json::{Value, json};
 use std::fs;
@@ -260,8 +260,10 @@ const MATTERS: [(&str, Edit); 19] = [
     ("max-bounces unlimited -> 0", |s| s.settings.render.max_bounces = Some(0)),
     ("cull-backfaces off -> on", |s| s.settings.render.cull_backfaces = true),
     ("texture-lod none -> on", |s| s.settings.render.texture_lod = true),
-    ("filter tent:2 -> box:2", |s| s.settings.render.filter = Filter::Box { width: 2.0 }),
-    ("filter tent:2 -> tent:2.0000002", |s| s.settings.render.filter = Filter::Tent { width: 2.0_f32.next_up() }),
+    ("filter tent:2 -> box:2", |s| s.settings.render.filter = Filter { shape: FilterShape::Box, width: 2.0 }),
+    ("filter tent:2 -> tent:2.0000002", |s| {
+        s.settings.render.filter = Filter { shape: FilterShape::Tent, width: 2.0_f32.next_up() }
+    }),
     ("default-light auto -> off", |s| s.settings.render.default_light = DefaultLight::Off),
     ("accel auto -> bvh", |s| s.settings.render.accel = AccelChoice::Bvh),
     ("scene default -> 0", |s| s.settings.load.scene = Some("0".into())),

@@ -234,13 +234,8 @@ impl Wanted<'_> {
             set("texture-lod", "on".into());
         }
         set("cull-backfaces", if *cull_backfaces { "on" } else { "off" }.into());
-        set(
-            "filter",
-            match filter {
-                Filter::Box { width } => format!("box:{width}"),
-                Filter::Tent { width } => format!("tent:{width}"),
-            },
-        );
+        let Filter { shape, width } = filter;
+        set("filter", format!("{}:{width}", shape.name()));
         set("brdf", name(brdf));
         set("default-light", name(default_light));
         set("accel", name(accel));

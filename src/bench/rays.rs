@@ -3,7 +3,7 @@
 use super::surface::SurfacePoint;
 use crate::accel::geometry::Geometry;
 use crate::accel::{Accel, HitBatch, RayBatch};
-use crate::camera::{Camera, CameraRays, PixelFilter};
+use crate::camera::{Camera, CameraRays, FilterShape, PixelFilter};
 use crate::film::TILE;
 use crate::integrator::POOL;
 use crate::math::V3;
@@ -165,7 +165,7 @@ impl Kernel for Generate<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { camera, pixels, samples, rays } = self;
-        let filter = PixelFilter::Tent { radius: 1.0 };
+        let filter = PixelFilter::new(FilterShape::Tent, 2.0);
         for at in (0..POOL).step_by(L::N) {
             let key = Key::<L> { pixel: L::U::load(pixels, at), sample: L::U::load(samples, at) };
             let u = key.group(L::U::splat(dims::CAMERA));

@@ -4,7 +4,7 @@ mod filter;
 mod look_at;
 mod rays;
 
-pub use filter::PixelFilter;
+pub use filter::{FilterShape, PixelFilter};
 pub use look_at::{NoView, look_at};
 pub use rays::CameraRays;
 

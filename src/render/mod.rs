@@ -26,7 +26,7 @@ pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
 pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};
 pub use progress::{Phase, Progress};
-pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Layers, RenderSettings};
+pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers, RenderSettings};
 pub use stopping::{StoppedBy, Stopping};
 pub use tracer::{camera, window};
 

@@ -1,6 +1,7 @@
 //! What a picture depends on beside the scene.
 
 use super::stopping::Stopping;
+pub use crate::camera::FilterShape;
 pub use crate::material::energy::Brdf;
 use std::path::PathBuf;
 
@@ -30,24 +31,18 @@ pub enum DefaultLight {
     Off,
 }
 
-/// Pixel filter, sampled by importance; `width` is its full support in pixels.
+/// Pixel filter, sampled by importance.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Filter {
-    /// Constant over the support.
-    Box {
-        /// Full support, pixels.
-        width: f32,
-    },
-    /// Falls linearly from the centre to the edge of the support.
-    Tent {
-        /// Full support, pixels.
-        width: f32,
-    },
+pub struct Filter {
+    /// Its shape.
+    pub shape: FilterShape,
+    /// Full support, pixels, > 0.
+    pub width: f32,
 }
 
 impl Default for Filter {
     fn default() -> Self {
-        Self::Tent { width: 2.0 }
+        Self { shape: FilterShape::Tent, width: 2.0 }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A prepared scene and settings become a [`PathTracer`]: what a frame and the pilot of a plan trace with.
 
 use super::framing::{framing_camera, vector_area};
-use super::{CropWindow, Filter, Prepared, RenderSettings};
+use super::{CropWindow, Prepared, RenderSettings};
 use crate::camera::{Camera, CameraRays, PixelFilter};
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
@@ -43,10 +43,7 @@ pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSett
         tables: &prepared.tables,
         accel: &*prepared.accel,
         camera: CameraRays::new(camera, settings.width, settings.height, prepared.origin),
-        filter: match settings.filter {
-            Filter::Box { width } => PixelFilter::Box { radius: 0.5 * width },
-            Filter::Tent { width } => PixelFilter::Tent { radius: 0.5 * width },
-        },
+        filter: PixelFilter::new(settings.filter.shape, settings.filter.width),
         max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
         is_capped: settings.max_bounces.is_none(),
         cull_backfaces: settings.cull_backfaces,

@@ -1,7 +1,7 @@
 //! Rendering over seeds, and reading stored pictures.
 
 use prt::image::exr_read::{self, Picture};
-use prt::render::{AccelChoice, Brdf, Filter, Frame, Progress, RenderSettings, render};
+use prt::render::{AccelChoice, Brdf, Filter, FilterShape, Frame, Progress, RenderSettings, render};
 use prt::scene::Scene;
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub fn settings(size: u32, spp: u32, seed: u64) -> RenderSettings {
         spp,
         seed,
         max_bounces: Some(32),
-        filter: Filter::Box { width: 1.0 },
+        filter: Filter { shape: FilterShape::Box, width: 1.0 },
         brdf: Brdf::AppendixB,
         accel: AccelChoice::Auto,
         embree_dirs: vec![Path::new(env!("CARGO_MANIFEST_DIR")).join(".embree")],

@@ -8,7 +8,7 @@ use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
-use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Layers};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers};
 use prt::verify::contenders::Backend;
 use std::ffi::OsStr;
 use std::str::FromStr;
@@ -157,7 +157,20 @@ pub fn threads(value: &str) -> Result<usize, String> {
     number(value, 1, 4096)
 }
 
-const FILTERS: Words<bool> = Words::new(&[("box", true), ("tent", false)], &["gaussian", "blackman-harris"]);
+/// Shapes by their names, each with the width that it has if nothing is said.
+const FILTERS: Words<(FilterShape, f32)> = {
+    const NAMES: [(&str, (FilterShape, f32)); FilterShape::NAMES.len()] = {
+        let mut names = [("", (FilterShape::Box, 0.0)); FilterShape::NAMES.len()];
+        let mut i = 0;
+        while i < names.len() {
+            let (name, shape, width) = FilterShape::NAMES[i];
+            names[i] = (name, (shape, width));
+            i += 1;
+        }
+        names
+    };
+    Words::new(&NAMES, &[])
+};
 
 fn filter(value: &str) -> Result<Filter, String> {
     const MAX_WIDTH: f32 = 64.0;
@@ -169,10 +182,8 @@ fn filter(value: &str) -> Result<Filter, String> {
         };
         width.map_or(Ok(default), parse)
     };
-    match FILTERS.find(name)? {
-        true => Ok(Filter::Box { width: width(1.0)? }),
-        false => Ok(Filter::Tent { width: width(2.0)? }),
-    }
+    let (shape, usual) = FILTERS.find(name)?;
+    Ok(Filter { shape, width: width(usual)? })
 }
 
 /// The word of a pixel filter, with or without a width behind it.

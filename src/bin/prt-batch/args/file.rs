@@ -133,9 +133,9 @@ pub struct FileArgs {
     #[arg(long, value_name = "MODEL", default_value = "full", value_parser = parse::brdf())]
     #[arg(help_heading = SAMPLING)]
     pub brdf: Brdf,
-    /// Pixel filter: box or tent, :WIDTH = full support in pixels
+    /// Pixel filter, :WIDTH = full support in pixels
     ///
-    /// Sampled by importance. tent:2 is smallpt's; box is :1.
+    /// Sampled by importance. tent:2 is smallpt's; box is :1, gaussian (standard deviation WIDTH / 6) and blackman-harris :3.
     #[arg(long, value_name = "NAME[:WIDTH]", default_value = "tent:2", help_heading = SAMPLING)]
     #[arg(value_parser = parse::FilterParser, hide_possible_values = true)]
     pub filter: Filter,
