@@ -302,7 +302,8 @@ pub fn bench_rounds(value: &str) -> Result<usize, String> {
 }
 
 pub fn verify() -> Words<What> {
-    Words::new(&[("hits", What::Hits), ("materials", What::Materials)], &["light", "lens", "shapes", "output"])
+    const BUILT: [(&str, What); 3] = [("hits", What::Hits), ("materials", What::Materials), ("light", What::Light)];
+    Words::new(&BUILT, &["lens", "shapes", "output"])
 }
 
 pub fn backend() -> Words<Backend> {
