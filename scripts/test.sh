@@ -98,6 +98,10 @@ if [ -n "$long" ]; then
   # BSDF-01 to -05, -10.
   target/release/prt-batch verify materials --samples 1000000 --random 2000 --seed "$(date +%j)"
   summary+=("verify materials: passed")
+  # LGT, ENV and INT: scenes with closed forms, by both backends where Embree is to be had.
+  target/release/prt-batch verify light
+  target/release/prt-batch verify light --accel bvh --seed "$(date +%j)"
+  summary+=("verify light: passed")
   if [ -x scripts/reference_check.sh ]; then
     scripts/reference_check.sh
     summary+=("reference check: passed")

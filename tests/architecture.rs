@@ -23,7 +23,6 @@ const MAY_USE: [(&str, &[&str]); 20] = [
     ("load", &["camera", "color", "error", "image", "light", "material", "math", "scene", "shape", "texture"]),
     ("integrator", &["accel", "camera", "id", "light", "material", "math", "sampler", "shape", "texture"]),
     ("compare", &["image"]),
-    ("verify", &["accel", "error", "material", "math", "texture"]),
     (
         "render",
         &[
@@ -43,6 +42,10 @@ const MAY_USE: [(&str, &[&str]); 20] = [
         ],
     ),
     ("bench", &["accel", "camera", "error", "film", "integrator", "load", "math", "render", "sampler", "scene"]),
+    (
+        "verify",
+        &["accel", "camera", "compare", "error", "light", "material", "math", "render", "scene", "shape", "texture"],
+    ),
 ];
 
 /// Sits on top: may use everything but the binary.

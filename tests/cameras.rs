@@ -69,8 +69,15 @@ fn by_exr(frame: &Frame, p: DVec3) -> (f64, f64) {
         aspect_ratio: frame.camera.aspect_ratio,
     };
     let size = [WIDTH, HEIGHT];
-    let picture =
-        ExrPicture { display_size: size, origin: [0, 0], size, pixels: &frame.pixels, camera, attributes: Vec::new() };
+    let picture = ExrPicture {
+        display_size: size,
+        origin: [0, 0],
+        size,
+        pixels: &frame.pixels,
+        channels: Vec::new(),
+        camera,
+        attributes: Vec::new(),
+    };
     let bytes = encode(&picture, ExrOptions::default()).expect("a whole picture");
     let meta = exr::meta::MetaData::read_from_buffered(std::io::Cursor::new(bytes), false).expect("a header");
     let m = meta.headers[0].own_attributes.world_to_normalized_device.expect("worldToNDC");

@@ -90,16 +90,12 @@ fn unbuilt_options_and_commands_are_refused_by_name() {
         "--animation",
         "--shutter",
         "--shutter-position",
-        "--target-error",
-        "--time-limit",
-        "--batch-time-limit",
         "--clamp",
         "--f-stop",
         "--focus-distance",
         "--focus-on",
         "--aperture-blades",
         "--sensor",
-        "--aov",
     ] {
         refused(root.path(), &["a.gltf", option, "-1"], 2, &[&format!("{option} is not built yet")]);
         refused(root.path(), &["render", option, "1", "a.gltf"], 2, &[&format!("{option} is not built yet")]);
@@ -226,6 +222,9 @@ fn json_has_every_field_of_the_contract() {
         "rays",
         "mrays_per_s",
         "estimated_error",
+        "stopped_by",
+        "target_error",
+        "worst_tile",
         "non_finite_samples",
         "truncated",
         "energy_clamped",

@@ -18,8 +18,15 @@ fn write(path: &Path, origin: [u32; 2], size: [u32; 2], value: impl Fn(u32, u32)
         projection: ExrProjection::Perspective { yfov: 1.0 },
         aspect_ratio: 1.0,
     };
-    let picture =
-        ExrPicture { display_size: [SIZE, SIZE], origin, size, pixels: &pixels, camera, attributes: Vec::new() };
+    let picture = ExrPicture {
+        display_size: [SIZE, SIZE],
+        origin,
+        size,
+        pixels: &pixels,
+        channels: Vec::new(),
+        camera,
+        attributes: Vec::new(),
+    };
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();
     std::fs::write(path, encode(&picture, ExrOptions::default()).unwrap()).unwrap();
 }

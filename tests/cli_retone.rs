@@ -43,7 +43,15 @@ fn exr(pixels: &[[f32; 3]]) -> Vec<u8> {
         aspect_ratio: 1.0,
     };
     let size = [pixels.len() as u32, 1];
-    let picture = ExrPicture { display_size: size, origin: [0, 0], size, pixels, camera, attributes: Vec::new() };
+    let picture = ExrPicture {
+        display_size: size,
+        origin: [0, 0],
+        size,
+        pixels,
+        channels: Vec::new(),
+        camera,
+        attributes: Vec::new(),
+    };
     encode(&picture, ExrOptions::default()).unwrap()
 }
 

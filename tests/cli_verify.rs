@@ -47,6 +47,19 @@ fn the_same_seed_gives_the_same_json_for_any_number_of_threads() {
 }
 
 #[test]
+fn light_has_scenes_of_its_own_and_one_backend() {
+    for (args, part) in [
+        (&["light", "a.gltf"][..], "scenes of its own"),
+        (&["light", "--accel", "bvh,linear"], "one ray backend at a time"),
+        (&["light", "--rays", "5"], "--rays means nothing to verify light"),
+        (&["lens"], "not built yet"),
+    ] {
+        let (code, _, stderr) = verify(args);
+        assert!(code == 2 && stderr.contains(part), "{args:?}: {code} {stderr}");
+    }
+}
+
+#[test]
 fn what_cannot_be_read_is_code_3_and_the_others_are_verified() {
     let (code, _, stderr) = verify(&["hits", "nowhere.gltf", "--rays", "20"]);
     assert!(code == 3 && stderr.contains("nowhere.gltf: there is no such file or folder"), "{code} {stderr}");

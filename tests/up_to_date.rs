@@ -2,6 +2,8 @@
 
 mod gltf_support;
 mod obj_support;
+#[path = "up_to_date/stopping.rs"]
+mod stopping;
 
 use gltf_support::{Sample, png};
 use prt::batch::content::{Content, HashCache, hash_sources};
@@ -19,6 +21,7 @@ use prt::scene::Scene;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A scene in a folder of its own, how it is to be rendered, and a folder with what was rendered. Pictures are stand-ins:
@@ -30,6 +33,9 @@ struct Shot {
     environment: Option<EnvironmentOrigin>,
     camera: usize,
     settings: FileSettings,
+    batch_time_limit: Option<Duration>,
+    /// Samples that it had when its sampling ended, and what ended it; `None`: all that were asked for.
+    ended: Option<(u32, &'static str)>,
 }
 
 impl Shot {
@@ -45,6 +51,8 @@ impl Shot {
             environment: None,
             camera: 0,
             settings: FileSettings { size: PictureSize::Width(64), ..FileSettings::default() },
+            batch_time_limit: None,
+            ended: None,
         }
     }
 
@@ -88,13 +96,15 @@ impl Shot {
             origin: &self.origin,
             environment: self.environment.as_ref(),
             camera: self.camera,
+            batch_time_limit: self.batch_time_limit,
         })
     }
 
     /// Of what is there now.
     fn fingerprint(&self) -> Fingerprint {
         let inputs = hash_sources(&self.scene().sources, &HashCache::default()).unwrap();
-        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs))
+        let spp = self.ended.map_or(self.settings.render.spp, |(spp, _)| spp);
+        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs, spp))
     }
 
     /// Writes files as a run would.
@@ -107,8 +117,12 @@ impl Shot {
                 fingerprint.add_output(kind, &bytes);
             }
         }
-        let report =
-            ImageReport { status: Status::Rendered, fingerprint: Some(fingerprint.clone()), ..ImageReport::default() };
+        let report = ImageReport {
+            status: Status::Rendered,
+            stopped_by: Some(self.ended.map_or("spp", |(_, by)| by).into()),
+            fingerprint: Some(fingerprint.clone()),
+            ..ImageReport::default()
+        };
         fs::write(self.out("json"), report::to_json(&report)).unwrap();
         fingerprint
     }

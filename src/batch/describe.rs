@@ -2,8 +2,8 @@
 
 use super::report::{self, Accel, ImageReport, Rays};
 use super::settings::FileSettings;
-use crate::film::ErrorEstimate;
-use crate::render::{AccelChoice, DefaultLight, Frame};
+use crate::film::{ErrorEstimate, Square};
+use crate::render::{AccelChoice, DefaultLight, Frame, StoppedBy, TargetReport};
 use std::path::Path;
 
 /// The report of an image of which nothing is known but what was asked for.
@@ -38,6 +38,18 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
         value,
         ci95,
     });
+    image.stopped_by = Some(stopped_by_name(stats.stopped_by).into());
+    image.target_error = stats.target.map(|TargetReport { target, is_met, above, spp_needed: _ }| {
+        report::TargetError { target, met: is_met, pixels_above: above }
+    });
+    image.worst_tile = stats.worst.map(|Square { pixels, error }| report::WorstTile {
+        x: pixels.x,
+        y: pixels.y,
+        width: pixels.width,
+        height: pixels.height,
+        error,
+    });
+    image.warnings.extend(target_warning(frame));
     image.triangles = Some(stats.triangles);
     image.instances = Some(stats.instances);
     image.placed_instances = Some(stats.placed_instances);
@@ -52,6 +64,40 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
     image.warnings.extend(stats.warnings.iter().cloned());
     image.losses.extend(stats.losses.iter().cloned());
+}
+
+/// What is said where the target was not reached, or there was nothing to tell by.
+fn target_warning(frame: &Frame) -> Option<String> {
+    let (stats, spp) = (&frame.stats, frame.spp);
+    let target = stats.target?;
+    let (Some(ErrorEstimate { value, ci95 }), Some(needed)) = (stats.error, target.spp_needed) else {
+        return Some(format!(
+            "--target-error: nothing but black was seen in {spp} samples of each pixel, so there is no relative error; \
+             the picture was taken as it is"
+        ));
+    };
+    // Two digits are more than an estimate of an estimate says.
+    let unit = 10.0_f64.powf((needed.log10().floor() - 1.0).max(0.0));
+    let needed = (needed / unit).ceil() * unit;
+    let [target_, value, upper] = [target.target, value, ci95[1]].map(report::percent);
+    (!target.is_met).then(|| {
+        format!(
+            "--target-error {} ({target_}) was not reached: after {spp} samples of each pixel, the most that --{} gives \
+             it, the error is about {value} and at most {upper}\n  It would take about {needed:.0} samples.",
+            target.target,
+            stopped_by_name(stats.stopped_by)
+        )
+    })
+}
+
+/// The option's name.
+pub(super) fn stopped_by_name(by: StoppedBy) -> &'static str {
+    match by {
+        StoppedBy::Spp => "spp",
+        StoppedBy::TargetError => "target-error",
+        StoppedBy::TimeLimit => "time-limit",
+        StoppedBy::BatchTimeLimit => "batch-time-limit",
+    }
 }
 
 /// The option's value.

@@ -9,6 +9,7 @@ use crate::camera::Camera;
 use crate::scene::Scene;
 use std::collections::HashMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What a task is rendered with.
 #[derive(Clone)]
@@ -33,9 +34,14 @@ impl Elsewhere {
     }
 
     /// An image of the task, with its camera's place.
-    pub fn wanted<'a>(&'a self, Task { input, settings }: &'a Task, camera: usize) -> Wanted<'a> {
+    pub fn wanted<'a>(
+        &'a self,
+        Task { input, settings }: &'a Task,
+        camera: usize,
+        batch_time_limit: Option<Duration>,
+    ) -> Wanted<'a> {
         let environment = self.environment.as_ref().map(|environment| &environment.origin);
-        Wanted { input: &input.path, settings, origin: &self.origin, environment, camera }
+        Wanted { input: &input.path, settings, origin: &self.origin, environment, camera, batch_time_limit }
     }
 
     /// Names of the cameras, if they are not the task's own.

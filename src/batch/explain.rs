@@ -4,6 +4,7 @@
 use super::content::HashCache;
 use super::describe::{accel_name, default_light_name};
 use super::elsewhere::Elsewhere;
+use super::fingerprint::StoppingRecord;
 use super::job::Plan;
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
@@ -56,8 +57,12 @@ pub struct Explanation {
     pub height: Option<u32>,
     /// X, Y, width, height.
     pub crop: Option<[u32; 4]>,
+    /// The most, if `stopping` is not null.
     pub spp: u32,
+    /// With that.
     pub paths: Option<u64>,
+    /// What may end sampling before.
+    pub stopping: Option<StoppingRecord>,
     pub seed: u64,
     pub accel: Accel,
     /// Why `auto` does not take Embree; empty if it does.
@@ -251,6 +256,7 @@ impl File<'_> {
         Explanation {
             input: input.path.display().to_string(),
             spp: render.spp,
+            stopping: self.elsewhere.wanted(&self.run.tasks[self.task], 0, self.run.batch_time_limit).stopping(),
             seed: render.seed,
             crop: render.crop.map(|c| [c.x, c.y, c.width, c.height]),
             accel: Accel { requested: accel_name(render.accel).into(), ..Accel::default() },
@@ -310,7 +316,7 @@ impl File<'_> {
 
     /// Whether an earlier run left what this one would write.
     fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
-        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera);
+        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera, self.run.batch_time_limit);
         let json = match &plan.outputs.json {
             Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
             _ => return,
@@ -385,7 +391,12 @@ impl File<'_> {
         let per_pixel =
             if settings.files.exr { EXR_SECONDS } else { 0.0 } + if settings.files.png { PNG_SECONDS } else { 0.0 };
         let seconds = &mut plan.seconds;
-        (seconds.render, seconds.write) = (Some(trial.render_seconds), Some(pixels * per_pixel));
+        let limit = render.stopping.time_limit.map(|limit| limit.as_secs_f64());
+        // A target ends it earlier, nobody knows when; the time of a batch is shared when it is there.
+        let is_open = render.stopping.target_error.is_some() || self.run.batch_time_limit.is_some();
+        let most = limit.map_or(trial.render_seconds, |limit| limit.min(trial.render_seconds));
+        seconds.render = (!is_open || limit.is_some()).then_some(most);
+        seconds.write = Some(pixels * per_pixel);
         let rays = trial.rays as f64 / trial.paths.max(1) as f64 * paths as f64;
         seconds.mrays_per_s = (trial.render_seconds > 0.0).then(|| rays / trial.render_seconds * 1e-6);
         let parts = [seconds.load, seconds.decode, seconds.build, seconds.render, seconds.write];

@@ -15,18 +15,19 @@ use crate::camera::Camera;
 use crate::color::Exposure;
 use crate::image::exr::ExrOptions;
 use crate::load::LoadOptions;
-use crate::render::{CropWindow, Filter, RenderSettings};
+use crate::render::{CropWindow, Filter, Layers, RenderSettings, Stopping};
 use crate::scene::SourceFile;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Write};
 use std::path::Path;
+use std::time::Duration;
 
 /// Settings by the name of their option, sorted, so that equal settings are equal text.
 pub type Settings = BTreeMap<String, String>;
 
 /// What an image was made from, as its JSON has it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Version of the program.
     pub prt: String,
@@ -34,12 +35,27 @@ pub struct Fingerprint {
     pub pixels: String,
     /// Hash of everything that determines the bytes of the files.
     pub files: String,
-    /// What was asked for, as far as it matters.
+    /// What was asked for, as far as it matters; `spp` is what was reached.
     pub settings: Settings,
+    /// What was to end sampling, if not a number of samples alone.
+    pub stopping: Option<StoppingRecord>,
     /// The files that were read or looked for, the input first.
     pub inputs: Vec<InputRecord>,
     /// The files that were written.
     pub outputs: Vec<OutputRecord>,
+}
+
+/// What was to end the sampling of an image. Pixels do not depend on it, only on how many samples there were in the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoppingRecord {
+    /// The most samples a pixel.
+    pub spp: u32,
+    /// As for `--target-error`.
+    pub target_error: Option<f64>,
+    /// Seconds.
+    pub time_limit: Option<f64>,
+    /// Seconds that its whole batch had.
+    pub batch_time_limit: Option<f64>,
 }
 
 /// A file that was written.
@@ -66,6 +82,8 @@ pub struct Wanted<'a> {
     pub environment: Option<&'a EnvironmentOrigin>,
     /// Which of them, by its place.
     pub camera: usize,
+    /// Of the run.
+    pub batch_time_limit: Option<Duration>,
 }
 
 /// Where cameras come from, as far as pixels depend on it.
@@ -100,15 +118,17 @@ impl CameraOrigin {
 }
 
 impl Fingerprint {
-    /// Of the image `wanted`, made from `inputs`; outputs are added as they are written.
-    pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>) -> Self {
-        let (pixel_settings, file_settings) = (wanted.pixel_settings(), file_settings(&wanted.settings.files));
+    /// Of the image `wanted`, made from `inputs` with `spp` samples a pixel; outputs are added as they are written.
+    pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>, spp: u32) -> Self {
+        let FileSettings { files, render, .. } = wanted.settings;
+        let (pixel_settings, file_settings) = (wanted.pixel_settings(spp), file_settings(files, render.layers));
         let pixels = hash_pixels(&pixel_settings, &inputs);
         Self {
             prt: crate::VERSION.into(),
             files: hash_files(&pixels, &file_settings),
             pixels,
             settings: pixel_settings.into_iter().chain(file_settings).collect(),
+            stopping: wanted.stopping(),
             inputs,
             outputs: Vec::new(),
         }
@@ -128,9 +148,10 @@ impl Fingerprint {
 
 impl Wanted<'_> {
     /// Everything that determines the pixels but the bytes of the inputs. Structures are taken apart whole, so that a
-    /// field that is added to one of them must be put here, or named as one that changes no pixel.
-    pub fn pixel_settings(&self) -> Settings {
-        let Self { input, settings, origin, environment, camera } = *self;
+    /// field that is added to one of them must be put here, or named as one that changes no pixel. With `spp` samples a
+    /// pixel, which is what is asked for unless something else ends sampling.
+    pub fn pixel_settings(&self, spp: u32) -> Settings {
+        let Self { input, settings, origin, environment, camera, batch_time_limit: _ } = *self;
         // Names of files change no pixel; which cameras, which environment and from where is said by `origin`, `camera` and
         // `environment`; `files` comes after the pixels.
         let FileSettings { name: _, size, camera_source: _, cameras: _, environment: _, load, render, files: _ } =
@@ -180,7 +201,10 @@ impl Wanted<'_> {
             width: _,
             height: _,
             crop,
-            spp,
+            // In their place, those that there were.
+            spp: _,
+            // Only how many samples there are in the end.
+            stopping: _,
             seed,
             frame,
             max_bounces,
@@ -192,6 +216,8 @@ impl Wanted<'_> {
             // As asked for: which backend `auto` takes is known only when the scene is prepared, and their pictures
             // differ by rounding alone.
             accel,
+            // What is written beside the pixels: with the files.
+            layers: _,
             // Where a library lies, how many work and how many lanes at a time: rounding at most.
             embree_dirs: _,
             threads: _,
@@ -217,13 +243,33 @@ impl Wanted<'_> {
     }
 }
 
+impl Wanted<'_> {
+    /// What is to end sampling; `None` if that is a number of samples alone.
+    pub fn stopping(&self) -> Option<StoppingRecord> {
+        // `batch_until` is the moment at which this run's share is over.
+        let RenderSettings { spp, stopping: Stopping { target_error, time_limit, batch_until: _ }, .. } =
+            self.settings.render;
+        let seconds = |limit: Option<Duration>| limit.map(|limit| limit.as_secs_f64());
+        let (time_limit, batch_time_limit) = (seconds(time_limit), seconds(self.batch_time_limit));
+        let is_open = target_error.is_some() || time_limit.is_some() || batch_time_limit.is_some();
+        is_open.then_some(StoppingRecord { spp, target_error, time_limit, batch_time_limit })
+    }
+}
+
 /// How the files that are asked for are made of the pixels.
-pub fn file_settings(files: &FileOptions) -> Settings {
+pub fn file_settings(files: &FileOptions, layers: Layers) -> Settings {
     let FileOptions { exr, png, format: ExrOptions { samples, compression }, tone: Tone { exposure, curve } } = files;
     let mut lines = Settings::new();
     if *exr {
         lines.insert("exr".into(), name(samples));
         lines.insert("exr-compression".into(), name(compression));
+        let Layers { variance, samples } = layers;
+        let layers: Vec<_> =
+            [("variance", variance), ("samples", samples)].into_iter().filter(|layer| layer.1).collect();
+        // Named only where there are any: pictures without have the fingerprints that they had before there were any.
+        if !layers.is_empty() {
+            lines.insert("aov".into(), layers.iter().map(|layer| layer.0).collect::<Vec<_>>().join(","));
+        }
     }
     if *png {
         let exposure = match exposure {

@@ -28,6 +28,7 @@ mod render_stage;
 pub mod report;
 mod run;
 mod settings;
+mod shares;
 mod size;
 pub mod up_to_date;
 mod view;

@@ -2,7 +2,9 @@
 
 use super::develop::Tone;
 use crate::camera::Projection;
-use crate::image::exr::{self, ExrCamera, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue};
+use crate::image::exr::{
+    self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue,
+};
 use crate::render::{Brdf, Frame, RenderSettings};
 
 /// Which files, and how.
@@ -53,10 +55,23 @@ pub(super) fn exr_bytes(
         origin: [window.x, window.y],
         size: [window.width, window.height],
         pixels: &frame.pixels,
+        channels: channels(frame),
         camera,
         attributes: attributes(frame, settings, clipped, fingerprint),
     };
     Ok((exr::encode(&picture, options)?, clipped))
+}
+
+/// The layers beside the colour.
+fn channels(frame: &Frame) -> Vec<ExrChannel> {
+    let variance = |(variance, channel): (&Vec<[f32; 3]>, usize)| ExrChannel {
+        name: ["variance.R", "variance.G", "variance.B"][channel],
+        samples: ExrChannelSamples::Float(variance.iter().map(|v| v[channel]).collect()),
+    };
+    let samples =
+        |samples: &Vec<u32>| ExrChannel { name: "samples", samples: ExrChannelSamples::Uint(samples.clone()) };
+    let variances = frame.variance.iter().flat_map(|of_pixels| (0..3).map(move |channel| (of_pixels, channel)));
+    variances.map(variance).chain(frame.samples.iter().map(samples)).collect()
 }
 
 /// The `prt:` attributes. Only what determines the pixels, so that equal renders have equal bytes: no times, paths,
@@ -153,7 +168,7 @@ mod tests {
         };
         let window = CropWindow { x: 3, y: 2, width: 2, height: 1 };
         let pixels = vec![[0.25, 0.5, 1.0], [f32::NAN, f32::INFINITY, -1.0]];
-        Frame { width: 8, height: 4, window, pixels, spp: 16, camera, stats }
+        Frame { width: 8, height: 4, window, pixels, spp: 16, variance: None, samples: None, camera, stats }
     }
 
     #[test]

@@ -50,6 +50,7 @@ impl RenderStage {
     }
 
     fn hand_on(&self, made: Made, to_write: &SyncSender<Made>) -> Result<(), Ended> {
+        self.shared.shares.done();
         let is_open = self.shared.opens_to_writer();
         if is_open && to_write.send(made).is_ok() { Ok(()) } else { Err(Ended) }
     }
@@ -155,7 +156,8 @@ impl RenderStage {
             return Ok(None);
         }
         let file = &*self.shared.settings.tasks[task].settings;
-        let settings = sized(file, scene, camera);
+        let mut settings = sized(file, scene, camera);
+        settings.stopping.batch_until = self.shared.shares.until(Instant::now());
         (image.width, image.height) = (Some(settings.width), Some(settings.height));
         image.notes.extend(aspect_note(file.size, scene, camera));
         let mut is_interrupted = false;

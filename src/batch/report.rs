@@ -61,6 +61,12 @@ pub struct ImageReport {
     pub mrays_per_s: Option<f64>,
     /// Null with fewer than four samples a pixel, and for black pictures.
     pub estimated_error: Option<EstimatedError>,
+    /// What ended sampling: `spp`, `target-error`, `time-limit`, `batch-time-limit`.
+    pub stopped_by: Option<String>,
+    /// Null without `--target-error`.
+    pub target_error: Option<TargetError>,
+    /// Null where `estimated_error` is.
+    pub worst_tile: Option<WorstTile>,
     pub non_finite_samples: Option<u64>,
     pub truncated: Option<f64>,
     /// Not built (`--clamp`).
@@ -103,6 +109,9 @@ impl ImageReport {
         if let Some(count) = self.non_finite_samples.filter(|count| *count > 0) {
             failures.push(format!("{count} samples were not finite and were dropped"));
         }
+        if let Some(missed) = self.target_error.as_ref().filter(|target| !target.met) {
+            failures.push(format!("--target-error {} was not reached", missed.target));
+        }
         failures.extend(self.losses.iter().cloned());
         failures
     }
@@ -139,11 +148,36 @@ pub struct EstimatedError {
 impl EstimatedError {
     /// Such as `1.3 %`.
     pub fn percent(&self) -> String {
-        let percent = 100.0 * self.value;
-        // Two digits are more than its interval says.
-        let decimals = (1.0 - percent.log10().floor()).clamp(0.0, 6.0);
-        format!("{percent:.*} %", if decimals.is_finite() { decimals as usize } else { 0 })
+        percent(self.value)
     }
+}
+
+/// Such as `1.3 %`, of an error: two digits are more than its interval says.
+pub fn percent(error: f64) -> String {
+    let percent = 100.0 * error;
+    let decimals = (1.0 - percent.log10().floor()).clamp(0.0, 6.0);
+    format!("{percent:.*} %", if decimals.is_finite() { decimals as usize } else { 0 })
+}
+
+/// What came of `--target-error`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct TargetError {
+    pub target: f64,
+    pub met: bool,
+    /// Share of the pixels; null for black pictures.
+    pub pixels_above: Option<f64>,
+}
+
+/// The part of the picture that is worst off.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct WorstTile {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+    pub error: f64,
 }
 
 /// The built-in studio light and why it is on or off.

@@ -16,6 +16,7 @@ use super::output::{WriteError, check_writable, sweep, write_atomic};
 use super::render_stage::RenderStage;
 use super::report::{self, Accel, BatchReport, Host, ImageReport, Outputs, Status};
 use super::settings::{BatchSettings, Task};
+use super::shares::Shares;
 use super::size::{PictureSize, check_crop};
 use super::up_to_date::{Kept, Why, check};
 use super::write_stage::WriteStage;
@@ -109,6 +110,8 @@ pub(super) struct Shared {
     pub stop: Arc<AtomicBool>,
     /// For what goes on beside rendering, whose own pool is busy.
     pub beside: rayon::ThreadPool,
+    /// Shares out `settings.batch_time_limit`.
+    pub shares: Shares,
     next_id: AtomicU64,
     gate: Mutex<Gate>,
 }
@@ -144,7 +147,7 @@ impl Shared {
 
     /// What is asked for of a task's camera.
     pub fn wanted(&self, task: usize, camera: usize) -> Wanted<'_> {
-        self.elsewhere[task].wanted(&self.settings.tasks[task], camera)
+        self.elsewhere[task].wanted(&self.settings.tasks[task], camera, self.settings.batch_time_limit)
     }
 
     /// The image as an earlier run left it, if that is what this run would write; else why not.
@@ -155,8 +158,11 @@ impl Shared {
             let of_kind = outputs.iter().find(|path| path.extension().is_some_and(|e| e == kind));
             of_kind.map(|path| path.display().to_string())
         };
+        // Nothing is missed that nobody asks for any more.
+        let is_asked_for = self.settings.tasks[task].settings.render.stopping.target_error.is_some();
         Ok(ImageReport {
             status: Status::UpToDate,
+            target_error: report.target_error.clone().filter(|_| is_asked_for),
             input: self.settings.tasks[task].input.path.display().to_string(),
             outputs: Outputs { exr: path("exr"), png: path("png"), json: Some(json.display().to_string()) },
             ..report
@@ -218,7 +224,9 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
     folders.into_iter().for_each(|folder| sweep(&settings.out.join(folder)));
 
     let jobs = jobs(&settings.tasks, &plan);
-    observer.planned(jobs.iter().map(Vec::len).sum());
+    let images = jobs.iter().map(Vec::len).sum();
+    observer.planned(images);
+    let shares = Shares::new(settings.batch_time_limit.map(|limit| clock + limit), images);
     let shared = Arc::new(Shared {
         settings,
         plan,
@@ -228,6 +236,7 @@ pub fn run(settings: BatchSettings, observer: &mut dyn Observer) -> Result<Outco
         budget: Budget::new(memory.bytes),
         stop: Arc::default(),
         beside,
+        shares,
         next_id: AtomicU64::new(0),
         gate: Mutex::default(),
     });

@@ -13,6 +13,7 @@ use crate::render::RenderSettings;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// How the images of one file are made; may differ from file to file.
 #[derive(Clone, Debug, Default)]
@@ -55,6 +56,8 @@ pub struct BatchSettings {
     pub threads: Option<usize>,
     /// Memory that may be used; `None` = [`super::memory::DEFAULT_SHARE`] of what this process may use.
     pub memory: Option<MemoryLimit>,
+    /// Time for all images together, which share what is left of it.
+    pub batch_time_limit: Option<Duration>,
     /// Render even what is up to date.
     pub force: bool,
     /// Count lost content, dropped samples and empty scenes as failures.

@@ -5,7 +5,9 @@
 //! that the image is rendered; it is never an error.
 
 use super::content::{Content, HashCache, InputRecord};
-use super::fingerprint::{OutputRecord, Settings, Wanted, file_settings, hash_files, hash_pixels};
+use super::fingerprint::{
+    Fingerprint, OutputRecord, Settings, StoppingRecord, Wanted, file_settings, hash_files, hash_pixels,
+};
 use super::picture::FileOptions;
 use super::report::{ImageReport, Status};
 use super::settings::FileSettings;
@@ -140,7 +142,7 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
         return Err(Why::Version { then: then.prt.clone() });
     }
     // From cheap to dear: most of what is not up to date is found without reading a file.
-    let FileSettings { files, load, .. } = wanted.settings;
+    let FileSettings { files, load, render, .. } = wanted.settings;
     let wanted_kinds = [("exr", files.exr), ("png", files.png)];
     let kinds = wanted_kinds.into_iter().filter_map(|(kind, is_wanted)| is_wanted.then_some(kind));
     let not_written = kinds.clone().find(|kind| !then.has_output(kind));
@@ -149,7 +151,10 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
     }
     // Files that are there and not asked for now do no harm.
     let files = FileOptions { exr: then.has_output("exr"), png: then.has_output("png"), ..*files };
-    let (pixel_settings, file_settings) = (wanted.pixel_settings(), file_settings(&files));
+    // What was reached; nobody asks for none.
+    let spp = then.settings.get("spp").and_then(|spp| spp.parse().ok()).unwrap_or(0);
+    check_stopping(spp, &report, then, wanted)?;
+    let (pixel_settings, file_settings) = (wanted.pixel_settings(spp), file_settings(&files, render.layers));
     compare(&then.settings, &pixel_settings, &file_settings)?;
     let outputs: Vec<_> = kinds.map(|kind| json.with_extension(kind)).collect();
     let record = |path: &Path| then.outputs.iter().find(|o| path.extension().is_some_and(|e| *e == *o.kind));
@@ -162,6 +167,36 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
     }
     outputs.iter().try_for_each(|path| check_content(path, record(path)))?;
     Ok(Kept { report, outputs })
+}
+
+/// Whether sampling ended where it would end now, too. What time allows differs from run to run: a picture that was
+/// ended by its time is kept where the same time is asked for, and no limit of time says anything against one that has
+/// all that was asked for.
+fn check_stopping(spp: u32, report: &ImageReport, then: &Fingerprint, wanted: &Wanted) -> Result<(), Why> {
+    let fixed = |spp| StoppingRecord { spp, target_error: None, time_limit: None, batch_time_limit: None };
+    let is_open = wanted.stopping().is_some();
+    let now = wanted.stopping().unwrap_or_else(|| fixed(wanted.settings.render.spp));
+    // However it was ended: the samples are what counts.
+    let then = then.stopping.clone().filter(|_| is_open).unwrap_or_else(|| fixed(spp));
+    let has_target = then.target_error == now.target_error;
+    let has_all = spp == now.spp && (now.target_error.is_none() || has_target);
+    let was_good = now.target_error.is_some() && report.stopped_by.as_deref() == Some("target-error");
+    let is_good = was_good && has_target && spp <= now.spp;
+    if has_all || is_good {
+        return Ok(());
+    }
+    let text = |value: Option<f64>| value.map(|value| value.to_string());
+    let seconds = |value: Option<f64>| value.map(|value| format!("{value}s"));
+    let fields = |record: &StoppingRecord| {
+        [
+            ("target-error", text(record.target_error)),
+            ("time-limit", seconds(record.time_limit)),
+            ("batch-time-limit", seconds(record.batch_time_limit)),
+            ("spp", Some(record.spp.to_string())),
+        ]
+    };
+    let differs = fields(&then).into_iter().zip(fields(&now)).find(|(then, now)| then != now);
+    differs.map_or(Ok(()), |((key, then), (_, now))| Err(Why::Setting { key: key.into(), then, now }))
 }
 
 /// The bytes of a JSON that may be anything.

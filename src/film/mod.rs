@@ -1,18 +1,22 @@
 //! The film: per pixel sums over blocks of the sample sequence, from which mean and error come.
 //!
-//! A picture's samples are cut into [`BLOCKS`] consecutive blocks. A (tile, block) pair is summed by one worker, rounded
-//! once and stored whole, so no addition depends on which thread did what, and the spread of the block means tells the
-//! error. Sums are compensated f64: paths of a pixel end in another order when a window is rendered, and its pixels must
-//! still be those of the whole picture.
+//! A picture's samples are taken in waves; after each of them the film may be read, and may go on. Where the sequence is
+//! cut into blocks (`blocks`) depends on the number of samples alone, and so do all bits of the picture: one that was
+//! stopped at 96 samples is that of `--spp 96`. A (tile, block) pair is summed by one worker, rounded once and stored
+//! whole, so no addition depends on which thread did what, and the spread of the block means tells the error. Sums are
+//! compensated f64: paths of a pixel end in another order when a window is rendered, and its pixels must still be those
+//! of the whole picture.
 
+pub mod blocks;
 mod estimate;
 
-pub use estimate::ErrorEstimate;
+pub use estimate::{ErrorEstimate, Errors, Square};
 
+use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
-/// Blocks a pixel's samples are cut into (fewer if there are fewer samples).
+/// Blocks a pixel's samples are cut into where they are a power of two (fewer if there are fewer samples).
 pub const BLOCKS: u32 = 4;
 
 /// Tiles are this many pixels wide and high, less at the border.
@@ -41,7 +45,11 @@ impl Tile {
 /// Sums of one tile over one block of samples, while it is rendered.
 #[derive(Debug)]
 pub struct TileSums {
-    /// Per pixel, row by row: R, G, B and the number of samples in them.
+    block: Range<u32>,
+    /// The number of the first leaf, and how many the block has.
+    first: u32,
+    leaves: u32,
+    /// Per pixel, row by row, and leaf: R, G, B and the number of samples in them.
     sums: Vec<([Sum; 3], u32)>,
 }
 
@@ -67,58 +75,70 @@ impl Sum {
     }
 }
 
+/// R, G, B sums of each pixel of a tile and the number of samples in them.
+type Rounded = Box<[[f32; 4]]>;
+
+/// Adds `other`, pixel by pixel.
+fn add_all(sums: &mut Rounded, other: &Rounded) {
+    for (sum, other) in sums.iter_mut().zip(other) {
+        sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+    }
+}
+
 impl TileSums {
-    /// Nothing yet.
-    pub fn new(tile: &Tile) -> Self {
-        Self { sums: vec![([Sum::default(); 3], 0); tile.area()] }
+    /// Nothing yet, of samples in `block` (see [`Wave::unit`]).
+    pub fn new(tile: &Tile, block: &Range<u32>) -> Self {
+        let first = blocks::leaf(block.start);
+        let leaves = blocks::leaf(block.end - 1) - first + 1;
+        let sums = vec![([Sum::default(); 3], 0); tile.area() * leaves as usize];
+        Self { block: block.clone(), first, leaves, sums }
     }
 
-    /// Adds a finite sample to pixel `pixel` (row by row in the tile).
+    /// Adds the finite sample `sample` of the block to pixel `pixel` (row by row in the tile).
     #[inline]
-    pub fn add(&mut self, pixel: u32, radiance: [f32; 3]) {
-        let (sum, count) = &mut self.sums[pixel as usize];
+    pub fn add(&mut self, pixel: u32, sample: u32, radiance: [f32; 3]) {
+        let leaf = blocks::leaf(sample) - self.first;
+        let (sum, count) = &mut self.sums[pixel as usize * self.leaves as usize + leaf as usize];
         for (s, r) in sum.iter_mut().zip(radiance) {
             s.add(f64::from(r));
         }
         *count += 1;
+    }
+
+    /// The sums of the whole block.
+    fn rounded(&self) -> Rounded {
+        let of_leaf = |leaf: usize| -> Rounded {
+            let sums = self.sums.iter().skip(leaf).step_by(self.leaves as usize);
+            sums.map(|&([r, g, b], n)| [r.rounded(), g.rounded(), b.rounded(), n as f32]).collect()
+        };
+        let mut parts =
+            blocks::leaves(&self.block).into_iter().enumerate().map(|(i, leaf)| (leaf, of_leaf(i))).collect();
+        blocks::joined(&self.block, &mut parts, &|sums, other| add_all(sums, &other))
     }
 }
 
 /// All block sums of a picture window.
 #[derive(Debug)]
 pub struct Film {
-    tiles: Vec<Tile>,
-    blocks: Vec<Range<u32>>,
-    /// `[block][tile]`, each R, G, B sums and the number of samples, per pixel.
-    sums: Vec<OnceLock<Box<[[f32; 4]]>>>,
+    tiles: Arc<[Tile]>,
+    spp: u32,
+    /// Those of [`blocks::layout`], each with the sums of every tile.
+    blocks: Vec<(Range<u32>, Vec<Rounded>)>,
     window: Tile,
 }
 
-impl Film {
-    /// A film for `window` with `spp` samples a pixel.
-    pub fn new(window: Tile, spp: u32) -> Self {
-        let mut tiles = Vec::new();
-        // Tiles lie on the whole picture's grid, so a window's pixels are those of the whole picture.
-        let mut y = window.y;
-        while y < window.y + window.height {
-            let bottom = (y / TILE + 1) * TILE;
-            let height = bottom.min(window.y + window.height) - y;
-            let mut x = window.x;
-            while x < window.x + window.width {
-                let right = (x / TILE + 1) * TILE;
-                let width = right.min(window.x + window.width) - x;
-                tiles.push(Tile { x, y, width, height });
-                x += width;
-            }
-            y += height;
-        }
-        let n = BLOCKS.min(spp);
-        let at = |i: u32| (u64::from(i) * u64::from(spp) / u64::from(n)) as u32;
-        let blocks: Vec<_> = (0..n).map(|i| at(i)..at(i + 1)).collect();
-        let sums = (0..tiles.len() * blocks.len()).map(|_| OnceLock::new()).collect();
-        Self { tiles, blocks, sums, window }
-    }
+/// Samples that a [`Film`] goes on by: units of work, which any thread may do.
+#[derive(Debug)]
+pub struct Wave {
+    tiles: Arc<[Tile]>,
+    /// Samples a pixel when it is done.
+    to: u32,
+    blocks: Vec<Range<u32>>,
+    /// `[block][tile]`.
+    sums: Vec<OnceLock<Rounded>>,
+}
 
+impl Wave {
     /// Units of work: (tile, block) pairs.
     pub fn units(&self) -> usize {
         self.sums.len()
@@ -134,43 +154,97 @@ impl Film {
     /// # Panics
     /// When it was stored before: two workers took one unit.
     pub fn store(&self, i: usize, sums: &TileSums) {
-        let rounded =
-            sums.sums.iter().map(|&([r, g, b], n)| [r.rounded(), g.rounded(), b.rounded(), n as f32]).collect();
-        assert!(self.sums[i].set(rounded).is_ok(), "each unit is rendered once");
+        assert!(self.sums[i].set(sums.rounded()).is_ok(), "each unit is rendered once");
+    }
+}
+
+impl Film {
+    /// A film for `window` without samples, in tiles of `side` x `side` pixels (less at the border), a multiple of 16;
+    /// nothing but the way in which threads share the work depends on it.
+    pub fn new(window: Tile, side: u32) -> Self {
+        assert!(side > 0 && side.is_multiple_of(estimate::CELL), "tiles are made of whole squares");
+        let mut tiles = Vec::new();
+        // Tiles lie on the whole picture's grid, so a window's pixels are those of the whole picture.
+        let mut y = window.y;
+        while y < window.y + window.height {
+            let bottom = (y / side + 1) * side;
+            let height = bottom.min(window.y + window.height) - y;
+            let mut x = window.x;
+            while x < window.x + window.width {
+                let right = (x / side + 1) * side;
+                let width = right.min(window.x + window.width) - x;
+                tiles.push(Tile { x, y, width, height });
+                x += width;
+            }
+            y += height;
+        }
+        Self { tiles: tiles.into(), spp: 0, blocks: Vec::new(), window }
     }
 
-    /// The mean of each pixel of the window, row by row; 0 where no sample survived.
+    /// Samples a pixel that it holds.
+    pub fn spp(&self) -> u32 {
+        self.spp
+    }
+
+    /// The work to go on to `to` samples a pixel.
+    ///
+    /// # Panics
+    /// When there are as many already, or the film ends where it cannot go on ([`blocks::is_end`]).
+    pub fn wave(&self, to: u32) -> Wave {
+        assert!(to > self.spp && blocks::is_end(self.spp), "films go on from the end of a block");
+        let blocks = blocks::beyond(self.spp, to);
+        let sums = (0..self.tiles.len() * blocks.len()).map(|_| OnceLock::new()).collect();
+        Wave { tiles: Arc::clone(&self.tiles), to, blocks, sums }
+    }
+
+    /// Takes in what a wave of this film brought.
     ///
     /// # Panics
     /// When a unit is missing.
+    pub fn take(&mut self, wave: Wave) {
+        let mut sums = wave.sums.into_iter().map(|sums| sums.into_inner().expect("every unit was rendered"));
+        let tiles = self.tiles.len();
+        self.blocks.extend(wave.blocks.into_iter().map(|block| (block, sums.by_ref().take(tiles).collect())));
+        let join = |sums: &mut Vec<Rounded>, other: Vec<Rounded>| {
+            sums.par_iter_mut().zip(other).for_each(|(sums, other)| add_all(sums, &other));
+        };
+        let layout = blocks::layout(wave.to).into_iter();
+        self.blocks = layout.map(|block| (block.clone(), blocks::joined(&block, &mut self.blocks, &join))).collect();
+        self.spp = wave.to;
+    }
+
+    /// The mean of each pixel of the window, row by row; 0 where no sample survived.
     pub fn mean(&self) -> Vec<[f32; 3]> {
         let mut pixels = vec![[0.0; 3]; self.window.area()];
-        let mut of_pixel = |x: usize, y: usize, blocks: [[f32; 4]; BLOCKS as usize]| {
-            let (mut sum, mut count) = ([0.0f64; 3], 0.0f64);
-            for block in blocks {
-                for (s, v) in sum.iter_mut().zip(block) {
-                    *s += f64::from(v);
-                }
-                count += f64::from(block[3]);
-            }
-            pixels[y * self.window.width as usize + x] = sum.map(|s| (s / count.max(1.0)) as f32);
-        };
-        (0..self.tiles.len()).for_each(|tile| self.each_pixel_of(tile, &mut of_pixel));
+        self.each_pixel(|at, blocks| {
+            let [r, g, b, count] = blocks.iter().fold([0.0f64; 4], |mut sum, block| {
+                sum.iter_mut().zip(block).for_each(|(s, v)| *s += f64::from(*v));
+                sum
+            });
+            pixels[at] = [r, g, b].map(|s| (s / count.max(1.0)) as f32);
+        });
         pixels
     }
 
-    /// Calls `with` for each pixel of tile `t`, by its place in the window, with its blocks' sums; zeroes for blocks that
-    /// there are none of.
-    fn each_pixel_of(&self, t: usize, mut with: impl FnMut(usize, usize, [[f32; 4]; BLOCKS as usize])) {
-        let tile = &self.tiles[t];
-        let units: Vec<&[[f32; 4]]> = (0..self.blocks.len())
-            .map(|block| &**self.sums[block * self.tiles.len() + t].get().expect("every unit was rendered"))
-            .collect();
-        for i in 0..tile.area() {
-            let mut blocks = [[0.0; 4]; BLOCKS as usize];
-            blocks.iter_mut().zip(&units).for_each(|(block, unit)| *block = unit[i]);
-            let (x, y) = (i % tile.width as usize, i / tile.width as usize);
-            with((tile.x - self.window.x) as usize + x, (tile.y - self.window.y) as usize + y, blocks);
+    /// How many samples are in the mean of each pixel: those that were finite.
+    pub fn counts(&self) -> Vec<u32> {
+        let mut counts = vec![0; self.window.area()];
+        self.each_pixel(|at, blocks| counts[at] = blocks.iter().map(|block| block[3] as u32).sum());
+        counts
+    }
+
+    /// Calls `with` for each pixel of the window, by its place in it, with its sums over the film's blocks.
+    fn each_pixel(&self, mut with: impl FnMut(usize, &[[f32; 4]])) {
+        let mut blocks = Vec::with_capacity(self.blocks.len());
+        for (t, tile) in self.tiles.iter().enumerate() {
+            let first =
+                (tile.y - self.window.y) as usize * self.window.width as usize + (tile.x - self.window.x) as usize;
+            for i in 0..tile.area() {
+                blocks.clear();
+                blocks.extend(self.blocks.iter().map(|(_, tiles)| tiles[t][i]));
+                let (x, y) = (i % tile.width as usize, i / tile.width as usize);
+                with(first + y * self.window.width as usize + x, &blocks);
+            }
         }
     }
 }
@@ -183,37 +257,82 @@ mod tests {
     fn every_pixel_is_in_one_tile_and_every_sample_in_one_block() {
         for (window, spp) in [((0, 0, 100, 37), 1), ((31, 5, 2, 70), 3), ((64, 64, 32, 32), 64), ((7, 9, 1, 1), 7)] {
             let window = Tile { x: window.0, y: window.1, width: window.2, height: window.3 };
-            let film = Film::new(window, spp);
-            let mut samples = vec![0; window.area()];
-            for i in 0..film.units() {
-                let (tile, range) = film.unit(i);
-                assert!(!range.is_empty());
-                for y in tile.y..tile.y + tile.height {
-                    for x in tile.x..tile.x + tile.width {
-                        samples[((y - window.y) * window.width + x - window.x) as usize] += range.len();
+            for side in [TILE, 16] {
+                let wave = Film::new(window, side).wave(spp);
+                let mut samples = vec![0; window.area()];
+                for i in 0..wave.units() {
+                    let (tile, range) = wave.unit(i);
+                    assert!(!range.is_empty());
+                    for y in tile.y..tile.y + tile.height {
+                        for x in tile.x..tile.x + tile.width {
+                            samples[((y - window.y) * window.width + x - window.x) as usize] += range.len();
+                        }
                     }
                 }
+                assert!(samples.iter().all(|&n| n == spp as usize));
             }
-            assert!(samples.iter().all(|&n| n == spp as usize));
+        }
+    }
+
+    /// A film of `window` after waves that end at `ends`, of `radiance(x, y, sample)`.
+    fn film(window: Tile, side: u32, ends: &[u32], radiance: impl Fn(u32, u32, u32) -> [f32; 3]) -> Film {
+        let mut film = Film::new(window, side);
+        for &end in ends {
+            let wave = film.wave(end);
+            for i in 0..wave.units() {
+                let (tile, samples) = wave.unit(i);
+                let mut sums = TileSums::new(&tile, &samples);
+                for pixel in 0..tile.area() as u32 {
+                    let (x, y) = (tile.x + pixel % tile.width, tile.y + pixel / tile.width);
+                    samples.clone().for_each(|sample| sums.add(pixel, sample, radiance(x, y, sample)));
+                }
+                wave.store(i, &sums);
+            }
+            film.take(wave);
+        }
+        film
+    }
+
+    #[test]
+    fn det_01_the_bits_of_a_picture_do_not_depend_on_its_waves_or_tiles() {
+        let window = Tile { x: 10, y: 20, width: 50, height: 30 };
+        // Of every size, so that each rounding shows.
+        let radiance = |x: u32, y: u32, sample: u32| {
+            let mixed = (x * 7919 + y * 104_729 + sample * 1_299_709).wrapping_mul(0x7feb_352d);
+            [1.0, 1e-3, 1e4].map(|scale| scale * (mixed >> 8) as f32 / 16_777_216.0)
+        };
+        for (ends, spp) in
+            [(&[32, 64, 96, 128][..], 128), (&[1, 2, 4, 8, 16, 32, 37], 37), (&[64, 96], 96), (&[3, 6], 6)]
+        {
+            let (in_waves, at_once) = (film(window, 16, ends, radiance), film(window, TILE, &[spp], radiance));
+            let pixels = at_once.mean();
+            assert_eq!(in_waves.mean(), pixels, "{spp}");
+            let estimate = |film: &Film| film.errors(&pixels).map(|errors| errors.estimate);
+            assert_eq!(estimate(&in_waves), estimate(&at_once), "{spp}");
+            assert_eq!(in_waves.variance(), at_once.variance(), "{spp}");
+            assert!(in_waves.counts().iter().all(|&n| n == spp));
         }
     }
 
     #[test]
     fn acc_01_mean_of_many_samples_is_exact_to_rounding_and_dropped_samples_leave_sum_and_weight() {
         let window = Tile { x: 0, y: 0, width: 2, height: 1 };
-        let film = Film::new(window, 4);
-        for i in 0..film.units() {
-            let (tile, _) = film.unit(i);
-            let mut sums = TileSums::new(&tile);
-            for k in 0..1_000_000u32 {
-                sums.add(0, [1.0 + (k % 2) as f32 * 1e-3, 0.1, 1e6]);
+        let mut film = Film::new(window, TILE);
+        let wave = film.wave(1 << 20);
+        for i in 0..wave.units() {
+            let (tile, samples) = wave.unit(i);
+            let mut sums = TileSums::new(&tile, &samples);
+            for k in samples {
+                sums.add(0, k, [1.0 + (k % 2) as f32 * 1e-3, 0.1, 1e6]);
             }
-            film.store(i, &sums);
+            wave.store(i, &sums);
         }
+        film.take(wave);
         let mean = film.mean();
         for (got, exact) in mean[0].iter().zip([1.0005, f64::from(0.1f32), 1e6]) {
             assert!((f64::from(*got) / exact - 1.0).abs() < 2e-7, "{got} for {exact}");
         }
         assert_eq!(mean[1], [0.0; 3]);
+        assert_eq!(film.counts(), [1 << 20, 0]);
     }
 }

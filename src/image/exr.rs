@@ -53,10 +53,30 @@ pub struct ExrPicture<'a> {
     pub size: [u32; 2],
     /// `[height * width]` of the data window: linear Rec.709; alpha is written as 1.
     pub pixels: &'a [[f32; 3]],
+    /// Channels beside R, G, B, A.
+    pub channels: Vec<ExrChannel>,
     /// For `worldToCamera` and `worldToNDC`.
     pub camera: ExrCamera,
     /// The other attributes; names of at most 31 bytes, each once.
     pub attributes: Vec<(&'static str, ExrValue)>,
+}
+
+/// A channel beside the colour, of the same pixels.
+#[derive(Clone, Debug)]
+pub struct ExrChannel {
+    /// With its layer in front: `variance.R`.
+    pub name: &'static str,
+    /// `[height * width]` of the data window.
+    pub samples: ExrChannelSamples,
+}
+
+/// As they are stored, whatever the colour is stored as.
+#[derive(Clone, Debug)]
+pub enum ExrChannelSamples {
+    /// 32 bits.
+    Float(Vec<f32>),
+    /// 32 bits.
+    Uint(Vec<u32>),
 }
 
 /// The camera of a picture.
@@ -109,10 +129,24 @@ pub fn encode(picture: &ExrPicture<'_>, options: ExrOptions) -> std::result::Res
     if picture.pixels.len() != size[0] * size[1] {
         return Err(format!("EXR: {} pixels do not fill {} x {}", picture.pixels.len(), size[0], size[1]));
     }
+    let lengths = picture.channels.iter().map(|channel| match &channel.samples {
+        ExrChannelSamples::Float(samples) => samples.len(),
+        ExrChannelSamples::Uint(samples) => samples.len(),
+    });
+    if let Some((channel, n)) = picture.channels.iter().zip(lengths).find(|(_, n)| *n != picture.pixels.len()) {
+        return Err(format!("EXR: {n} samples of {} do not fill {} x {}", channel.name, size[0], size[1]));
+    }
     let is_small = picture.pixels.len() <= SMALL;
     let pixel = |at: Vec2<usize>| picture.pixels[at.y() * size[0] + at.x()];
     let mut bytes = Cursor::new(Vec::new());
     match options.samples {
+        _ if !picture.channels.is_empty() => {
+            let image = image(picture, options.compression, with_channels(picture, options.samples));
+            match is_small {
+                true => image.write().non_parallel().to_buffered(&mut bytes),
+                false => image.write().to_buffered(&mut bytes),
+            }
+        }
         ExrSamples::Float => {
             let float = |at| {
                 let [r, g, b] = pixel(at);
@@ -140,6 +174,27 @@ pub fn encode(picture: &ExrPicture<'_>, options: ExrOptions) -> std::result::Res
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes).ok_or("EXR: the header just written cannot be read")?;
     Ok(bytes)
+}
+
+/// R, G, B, A and the other channels.
+fn with_channels(picture: &ExrPicture<'_>, samples: ExrSamples) -> AnyChannels<FlatSamples> {
+    let colour = |name: &'static str, value: &dyn Fn(&[f32; 3]) -> f32| {
+        let values = picture.pixels.iter().map(value);
+        let samples = match samples {
+            ExrSamples::Float => FlatSamples::F32(values.collect()),
+            ExrSamples::Half => FlatSamples::F16(values.map(half).collect()),
+        };
+        AnyChannel::new(name, samples)
+    };
+    let other = |channel: &ExrChannel| {
+        let samples = match &channel.samples {
+            ExrChannelSamples::Float(samples) => FlatSamples::F32(samples.clone()),
+            ExrChannelSamples::Uint(samples) => FlatSamples::U32(samples.clone()),
+        };
+        AnyChannel::new(channel.name, samples)
+    };
+    let colours = [colour("R", &|p| p[0]), colour("G", &|p| p[1]), colour("B", &|p| p[2]), colour("A", &|_| 1.0)];
+    AnyChannels::sort(colours.into_iter().chain(picture.channels.iter().map(other)).collect())
 }
 
 /// The nearest half; beyond the greatest, that one instead of infinity. NaN stays NaN.

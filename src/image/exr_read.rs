@@ -52,6 +52,28 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<Picture, String> {
     decode_with_alpha(bytes).map(|(picture, _)| picture)
 }
 
+/// Every channel of an EXR's first part by its name, in the order of names: `[height * width]`, whatever they are stored
+/// as.
+///
+/// # Errors
+/// It is no EXR, or it is damaged.
+pub fn channels(bytes: &[u8]) -> std::result::Result<Vec<(String, Vec<f32>)>, String> {
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| format!("not a readable EXR: {error}"))?;
+    let channel = |channel: AnyChannel<FlatSamples>| {
+        let count = channel.sample_data.len();
+        let values = (0..count).map(|i| channel.sample_data.value_by_flat_index(i).to_f32()).collect();
+        (channel.name.to_string(), values)
+    };
+    Ok(image.layer_data.channel_data.list.into_iter().map(channel).collect())
+}
+
 /// [`decode`], and the samples of `A` of the same layer if it has one: `[height * width]`, 1 = opaque, the colour being
 /// premultiplied by it.
 ///

@@ -23,7 +23,15 @@ fn picture(width: u32, height: u32, pixels: &[[f32; 3]]) -> ExrPicture<'_> {
         ("prt:truncated", ExrValue::Double(0.25)),
         ("prt:accel", ExrValue::Text("bvh".into())),
     ];
-    ExrPicture { display_size: [width, height], origin: [0, 0], size: [width, height], pixels, camera, attributes }
+    ExrPicture {
+        display_size: [width, height],
+        origin: [0, 0],
+        size: [width, height],
+        pixels,
+        channels: Vec::new(),
+        camera,
+        attributes,
+    }
 }
 
 fn zip(picture: &ExrPicture<'_>) -> Vec<u8> {
@@ -185,4 +193,27 @@ fn stored_matrices_take_a_known_point_to_camera_and_picture() {
         }
         assert!((0.0..1.0).contains(&(z / w)));
     }
+}
+
+#[test]
+fn channels_beside_the_colour_keep_their_type_and_must_fill_the_picture() {
+    let pixels = [[0.25, 0.5, 1.0]; 6];
+    let channel = |name, samples| ExrChannel { name, samples };
+    let with = |n: usize| ExrPicture {
+        channels: vec![
+            channel("variance.R", ExrChannelSamples::Float(vec![1e-30; n])),
+            channel("samples", ExrChannelSamples::Uint(vec![16_777_217; 6])),
+        ],
+        ..picture(3, 2, &pixels)
+    };
+    let half = ExrOptions { samples: ExrSamples::Half, ..ExrOptions::default() };
+    let bytes = encode(&with(6), half).unwrap();
+    let found = crate::image::exr_read::channels(&bytes).unwrap();
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["A", "B", "G", "R", "samples", "variance.R"]);
+    // Half would have none of it.
+    assert_eq!((found[5].1[3], found[1].1[0]), (1e-30, 1.0));
+    assert_eq!(encode(&with(6), half).unwrap(), bytes, "equal pictures have equal bytes");
+    let wrong = encode(&with(5), half).unwrap_err();
+    assert_eq!(wrong, "EXR: 5 samples of variance.R do not fill 3 x 2");
 }

@@ -10,8 +10,8 @@ use std::ops::Range;
 
 /// Receives finished samples, in a fixed order for a fixed unit.
 pub trait SampleSink {
-    /// A finite sample of pixel `pixel` (row by row in the unit's rectangle).
-    fn add(&mut self, pixel: u32, radiance: [f32; 3]);
+    /// The finite sample `sample` of pixel `pixel` (row by row in the unit's rectangle).
+    fn add(&mut self, pixel: u32, sample: u32, radiance: [f32; 3]);
     /// A sample that was dropped because a channel was not finite.
     fn drop_non_finite(&mut self, pixel: u32, sample: u32);
     /// Asked once a wave, after its samples were received: false ends the unit where it is, incomplete.
@@ -53,6 +53,16 @@ impl Counters {
     /// All rays.
     pub fn total(&self) -> u64 {
         self.camera + self.bounce + self.shadow
+    }
+
+    /// Adds those of another worker.
+    pub fn add(&mut self, other: &Self) {
+        let Self { camera, bounce, shadow, truncated, unpaired } = other;
+        self.camera += camera;
+        self.bounce += bounce;
+        self.shadow += shadow;
+        self.truncated += truncated;
+        self.unpaired += unpaired;
     }
 }
 
@@ -96,7 +106,7 @@ impl PathTracer<'_> {
                 let radiance = std::mem::take(&mut pool.radiance[slot as usize]);
                 let (pixel, sample) = pool.origin[slot as usize];
                 if radiance.iter().all(|r| r.is_finite()) {
-                    sink.add(pixel, radiance);
+                    sink.add(pixel, sample, radiance);
                 } else {
                     sink.drop_non_finite(pixel, sample);
                 }

@@ -2,9 +2,14 @@
 
 use super::features::features;
 use super::prepare::prepare;
-use super::{Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, schedule, tracer};
+use super::schedule::Totals;
+use super::stopping::{Next, StoppedBy, Waves};
+use super::{
+    Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, TargetReport, schedule, tracer,
+};
 use crate::error::RenderError;
-use crate::film::{Film, Tile};
+use crate::film::{Errors, Film, TILE, Tile};
+use crate::integrator::PathTracer;
 use crate::scene::Scene;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -81,19 +86,14 @@ pub fn render_prepared(
     assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
     let camera = tracer::camera(scene, camera, &prepared, settings);
     let window = tracer::window(settings);
-    let film = Film::new(Tile { x: window.x, y: window.y, width: window.width, height: window.height }, settings.spp);
     let tracer = tracer::tracer(&prepared, &camera, settings);
-    let paths = u64::from(window.width) * u64::from(window.height) * u64::from(settings.spp);
-    progress.total.store(paths, Ordering::Relaxed);
+    let window_tile = Tile { x: window.x, y: window.y, width: window.width, height: window.height };
     progress.enter(Phase::Rendering);
     let start = Instant::now();
-    let totals = schedule::trace(&tracer, &film, progress);
-    if progress.is_cancelled() {
-        return Err(RenderError::Interrupted);
-    }
-    let pixels = film.mean();
-    let error = film.error(&pixels);
+    let Sampled { film, totals, pixels, errors, stopped_by } = sample(&tracer, window_tile, settings, progress)?;
     let render_seconds = start.elapsed().as_secs_f64();
+    let spp = film.spp();
+    let paths = window_tile.area() as u64 * u64::from(spp);
 
     let features = features(scene, &prepared);
     let lanes = tracer.level.lanes();
@@ -114,6 +114,13 @@ pub fn render_prepared(
             100.0 * unpaired
         ));
     }
+    let target = settings.stopping.target_error;
+    let target = target.map(|target| TargetReport {
+        target,
+        is_met: errors.as_ref().is_none_or(|errors| errors.upper_at(spp) <= target),
+        above: errors.as_ref().map(|errors| errors.share_above(target)),
+        spp_needed: errors.as_ref().map(|errors| errors.spp_for(target)),
+    });
     let tables = &prepared.tables;
     let stats = RenderStats {
         build_seconds: 0.0,
@@ -124,7 +131,10 @@ pub fn render_prepared(
         non_finite_samples: totals.non_finite,
         non_finite_examples: totals.examples,
         truncated: totals.counters.truncated as f64 / paths as f64,
-        error,
+        error: errors.as_ref().map(|errors| errors.estimate),
+        worst: errors.as_ref().map(Errors::worst),
+        stopped_by,
+        target,
         triangles: prepared.placed.triangles,
         instances: scene.instances.len() as u64,
         placed_instances: prepared.placed.instances,
@@ -142,5 +152,65 @@ pub fn render_prepared(
         projection: camera.projection,
         aspect_ratio: f64::from(width) / f64::from(height),
     };
-    Ok(Frame { width, height, window, pixels, spp: settings.spp, camera: frame_camera, stats })
+    let variance = settings.layers.variance.then(|| film.variance());
+    let samples = settings.layers.samples.then(|| film.counts());
+    Ok(Frame { width, height, window, pixels, spp, variance, samples, camera: frame_camera, stats })
+}
+
+/// What sampling brings.
+struct Sampled {
+    film: Film,
+    totals: Totals,
+    pixels: Vec<[f32; 3]>,
+    errors: Option<Errors>,
+    stopped_by: StoppedBy,
+}
+
+/// Units of work a thread below which tiles are made smaller.
+const FEW_UNITS: u32 = 8;
+
+/// Takes samples, wave by wave, until the picture is done.
+fn sample(
+    tracer: &PathTracer<'_>,
+    window: Tile,
+    settings: &RenderSettings,
+    progress: &Progress,
+) -> Result<Sampled, RenderError> {
+    let start = Instant::now();
+    let elapsed = || start.elapsed().as_secs_f64();
+    let stopping = &settings.stopping;
+    // All threads wait at the end of a wave, so that there must be enough to share out in each.
+    let is_small = window.area() / ((TILE * TILE) as usize) < FEW_UNITS as usize * rayon::current_num_threads();
+    let mut film = Film::new(window, if stopping.is_open() && is_small { TILE / 2 } else { TILE });
+    let mut waves = Waves::new(stopping, settings.spp, start);
+    let mut totals = Totals::default();
+    let mut pixels = Vec::new();
+    let stopped_by = loop {
+        let to = match waves.next(elapsed()) {
+            Next::To(to) => to,
+            Next::Stop(by) => break by,
+        };
+        let paths = |spp: u32| window.area() as u64 * u64::from(spp);
+        let expected = waves.expected(elapsed()).map_or(0, |spp| paths(spp.max(to)));
+        progress.total.store(expected, Ordering::Relaxed);
+        let before = elapsed();
+        let wave = film.wave(to);
+        totals.add(schedule::trace(tracer, &wave, progress));
+        if progress.is_cancelled() {
+            return Err(RenderError::Interrupted);
+        }
+        film.take(wave);
+        waves.took(to, elapsed() - before);
+        if waves.looks() {
+            pixels = film.mean();
+            waves.saw(film.errors(&pixels));
+        }
+    };
+    let is_seen = waves.looks();
+    if !is_seen {
+        pixels = film.mean();
+    }
+    let errors = if is_seen { waves.into_errors() } else { film.errors(&pixels) };
+    progress.total.store(window.area() as u64 * u64::from(film.spp()), Ordering::Relaxed);
+    Ok(Sampled { film, totals, pixels, errors, stopped_by })
 }

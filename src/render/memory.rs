@@ -9,7 +9,7 @@ use super::{AccelChoice, DefaultLight, RenderSettings};
 use crate::accel::front::{MOST, MOST_TWICE};
 use crate::accel::geometry::{Affine, Placement};
 use crate::accel::wide::{MOST_SPLITS, may_split};
-use crate::film::BLOCKS;
+use crate::film::blocks;
 use crate::light::{element::LampTriangle, studio};
 use crate::scene::{Instance, Scene};
 use crate::shape::Mesh;
@@ -104,12 +104,17 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let pixels = u64::from(window.width).saturating_mul(u64::from(window.height));
     let threads = settings.threads.unwrap_or_else(cores) as u64;
     // Four f32 a block, and 3 f32 of the mean; a hundredth for what the allocator needs.
-    let film = pixels.saturating_mul(16 * u64::from(BLOCKS.min(settings.spp)) + 12);
+    let is_open = settings.stopping.is_open();
+    let held = if is_open { blocks::MOST.min(settings.spp) } else { blocks::layout(settings.spp).len() as u32 };
+    let layers = settings.layers.bytes();
+    let film = pixels.saturating_mul(16 * u64::from(held) + 12 + layers);
     let film = film.saturating_add(film / 100);
     let embree =
         if settings.accel == AccelChoice::Auto || settings.accel == AccelChoice::Embree { EMBREE_LIBRARY } else { 0 };
-    // 3 f32 a pixel; EXR: 4 f32 a pixel; PNG: 3 bytes a pixel and, compressed, no more again.
-    let files = 12 + if files.exr { 16 } else { 0 } + if files.png { 6 } else { 0 };
+    // 3 f32 a pixel; EXR: 4 f32 a pixel, with layers planar before that; PNG: 3 bytes a pixel and, compressed, no more
+    // again.
+    let planar = if layers > 0 { 16 + 2 * layers } else { 0 };
+    let files = 12 + layers + if files.exr { 16 + planar } else { 0 } + if files.png { 6 } else { 0 };
     MemoryEstimate {
         program: PROGRAM + embree + threads * THREAD,
         film,

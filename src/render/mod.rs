@@ -15,6 +15,7 @@ mod progress;
 mod refraction;
 mod schedule;
 mod settings;
+mod stopping;
 mod tracer;
 
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
@@ -25,7 +26,8 @@ pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
 pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};
 pub use progress::{Phase, Progress};
-pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, RenderSettings};
+pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers, RenderSettings};
+pub use stopping::{StoppedBy, Stopping};
 pub use tracer::{camera, window};
 
 /// A camera's matrices for the picture that was rendered, f64, column vectors (`dst_from_src`).
@@ -80,6 +82,12 @@ pub struct RenderStats {
     /// How far the picture is from that of endless samples; `None` with fewer than four samples a pixel, or if it is
     /// black.
     pub error: Option<crate::film::ErrorEstimate>,
+    /// The part of the picture that is worst off, where there is an error.
+    pub worst: Option<crate::film::Square>,
+    /// What ended sampling.
+    pub stopped_by: StoppedBy,
+    /// What came of the target of the error, where there was one.
+    pub target: Option<TargetReport>,
     /// Triangles that rays can meet, with every instance.
     pub triangles: u64,
     /// Meshes that the file places.
@@ -104,6 +112,19 @@ pub struct RenderStats {
     pub losses: Vec<String>,
 }
 
+/// How near a picture came to the error that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TargetReport {
+    /// What was asked for: sqrt(relMSE).
+    pub target: f64,
+    /// The upper end of the interval is at most that. A black picture has no error and is taken as it is: true.
+    pub is_met: bool,
+    /// Share of the pixels in parts of the picture whose error is above it; `None` for a black picture.
+    pub above: Option<f64>,
+    /// About how many samples a pixel it takes; `None` for a black picture.
+    pub spp_needed: Option<f64>,
+}
+
 /// A rendered picture. `pixels` covers `window` only, row by row from the top.
 #[derive(Clone, Debug)]
 pub struct Frame {
@@ -115,8 +136,14 @@ pub struct Frame {
     pub window: CropWindow,
     /// `[window.height * window.width]` linear Rec.709 radiance, nits; alpha is 1.
     pub pixels: Vec<[f32; 3]>,
-    /// Samples per pixel.
+    /// Samples per pixel that were taken.
     pub spp: u32,
+    /// `[window.height * window.width]` variance of each channel of the pixel, if that was asked for: on the safe side,
+    /// infinite with one sample.
+    pub variance: Option<Vec<[f32; 3]>>,
+    /// `[window.height * window.width]` samples in each pixel, if that was asked for: fewer than `spp` where some were
+    /// dropped.
+    pub samples: Option<Vec<u32>>,
     /// For the EXR's matrices.
     pub camera: FrameCamera,
     /// Counts and times.

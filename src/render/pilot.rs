@@ -37,7 +37,7 @@ struct Nowhere;
 
 impl SampleSink for Nowhere {
     #[inline]
-    fn add(&mut self, _pixel: u32, _radiance: [f32; 3]) {}
+    fn add(&mut self, _pixel: u32, _sample: u32, _radiance: [f32; 3]) {}
 
     fn drop_non_finite(&mut self, _pixel: u32, _sample: u32) {}
 

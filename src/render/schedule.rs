@@ -1,7 +1,7 @@
 //! Units of work among threads: whoever is free takes the next one, and no result depends on who that was.
 
 use super::Progress;
-use crate::film::{Film, TileSums};
+use crate::film::{TileSums, Wave};
 use crate::integrator::{Counters, PathTracer, SampleSink, Unit, Worker};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,6 +20,16 @@ pub struct Totals {
     pub examples: Vec<(u32, u32, u32)>,
 }
 
+impl Totals {
+    /// Adds those of a later wave.
+    pub fn add(&mut self, later: Self) {
+        self.counters.add(&later.counters);
+        self.non_finite += later.non_finite;
+        self.examples.extend(later.examples);
+        self.examples.truncate(EXAMPLES);
+    }
+}
+
 /// Adds a unit's samples to its tile's sums.
 struct Sink<'a> {
     unit: &'a Unit,
@@ -35,8 +45,8 @@ struct Sink<'a> {
 
 impl SampleSink for Sink<'_> {
     #[inline]
-    fn add(&mut self, pixel: u32, radiance: [f32; 3]) {
-        self.sums.add(pixel, radiance);
+    fn add(&mut self, pixel: u32, sample: u32, radiance: [f32; 3]) {
+        self.sums.add(pixel, sample, radiance);
         self.finished += 1;
     }
 
@@ -59,9 +69,9 @@ impl SampleSink for Sink<'_> {
     }
 }
 
-/// Traces every unit of `film` on the threads of the current rayon pool. Ends early, with units missing, when
-/// `progress` is cancelled: a wave takes about a millisecond.
-pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Totals {
+/// Traces every unit of `wave` on the threads of the current rayon pool. Ends early, with units missing, when
+/// `progress` is cancelled: a round of a worker's paths takes about a millisecond.
+pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Totals {
     let next = AtomicUsize::new(0);
     let found = Mutex::new((Totals::default(), Vec::new()));
     rayon::broadcast(|_| {
@@ -70,15 +80,16 @@ pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Total
         let mut examples = Vec::new();
         while !progress.is_cancelled() {
             let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= film.units() {
+            if i >= wave.units() {
                 break;
             }
-            let (tile, samples) = film.unit(i);
+            let (tile, samples) = wave.unit(i);
+            let sums = TileSums::new(&tile, &samples);
             let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples };
             let mut sink = Sink {
                 unit: &unit,
                 progress,
-                sums: TileSums::new(&tile),
+                sums,
                 finished: 0,
                 rays: worker.counters.total(),
                 non_finite: 0,
@@ -88,17 +99,13 @@ pub fn trace(tracer: &PathTracer<'_>, film: &Film, progress: &Progress) -> Total
             if progress.is_cancelled() {
                 break;
             }
-            film.store(i, &sink.sums);
+            wave.store(i, &sink.sums);
             non_finite += sink.non_finite;
             examples.extend(sink.examples.into_iter().map(|e| (i, e)));
         }
         let mut found = found.lock().expect("no worker panics with the lock held");
         let (totals, all) = &mut *found;
-        totals.counters.camera += worker.counters.camera;
-        totals.counters.bounce += worker.counters.bounce;
-        totals.counters.shadow += worker.counters.shadow;
-        totals.counters.truncated += worker.counters.truncated;
-        totals.counters.unpaired += worker.counters.unpaired;
+        totals.counters.add(&worker.counters);
         totals.non_finite += non_finite;
         all.extend(examples);
     });

@@ -1,5 +1,6 @@
 //! What a picture depends on beside the scene.
 
+use super::stopping::Stopping;
 pub use crate::camera::FilterShape;
 pub use crate::material::energy::Brdf;
 use std::path::PathBuf;
@@ -58,6 +59,22 @@ pub struct CropWindow {
     pub height: u32,
 }
 
+/// What there may be of each pixel beside its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layers {
+    /// The variance of the pixel's mean.
+    pub variance: bool,
+    /// How many samples are in it.
+    pub samples: bool,
+}
+
+impl Layers {
+    /// Bytes a pixel.
+    pub(super) fn bytes(self) -> u64 {
+        12 * u64::from(self.variance) + 4 * u64::from(self.samples)
+    }
+}
+
 /// Settings of one frame.
 #[derive(Clone, Debug)]
 pub struct RenderSettings {
@@ -67,8 +84,10 @@ pub struct RenderSettings {
     pub height: u32,
     /// Render only this window; its pixels equal those of the whole picture.
     pub crop: Option<CropWindow>,
-    /// Samples per pixel, >= 1.
+    /// Samples per pixel, >= 1; the most if `stopping` leaves their number open.
     pub spp: u32,
+    /// What may end sampling before that.
+    pub stopping: Stopping,
     /// Same seed, same pixels.
     pub seed: u64,
     /// Animation frame number; part of the random numbers.
@@ -85,6 +104,8 @@ pub struct RenderSettings {
     pub brdf: Brdf,
     /// Built-in studio light.
     pub default_light: DefaultLight,
+    /// What is to be had beside the picture; changes none of its bytes.
+    pub layers: Layers,
     /// Ray backend.
     pub accel: AccelChoice,
     /// Folders in which libembree4 is looked for, after `EMBREE_DIR` and before the system's.
@@ -107,6 +128,7 @@ impl Default for RenderSettings {
             height: 720,
             crop: None,
             spp: 64,
+            stopping: Stopping::default(),
             seed: 0,
             frame: 0,
             max_bounces: None,
@@ -115,6 +137,7 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),
+            layers: Layers::default(),
             accel: AccelChoice::default(),
             embree_dirs: Vec::new(),
             threads: None,

@@ -1,42 +1,11 @@
 //! Exact values: open it to see what a closed-form scene must show, and why.
 //!
-//! All in f64, linear, nits. Polygon light: Lambert's formula. GGX albedos: quadrature of glTF 2.0 appendix B with
+//! All in f64, linear, nits. The formulas of lights and rooms are those of `verify light`. GGX albedos: quadrature of glTF 2.0 appendix B with
 //! height-correlated G (Heitz 2014, "Understanding the Masking-Shadowing Function", JCGT 3(2), section 6.3).
 
 use glam::{DQuat, DVec3};
+pub use prt::verify::light::exact::*;
 use std::f64::consts::{FRAC_PI_2, PI};
-
-/// Irradiance (lux) at `point` with unit normal `normal` under a polygon of uniform radiance `radiance` (nits) that
-/// shines towards the point and lies wholly above its horizon. Corners in order, either sense.
-pub fn polygon_irradiance(corners: &[DVec3], point: DVec3, normal: DVec3, radiance: f64) -> f64 {
-    let sum: f64 = (0..corners.len())
-        .map(|i| {
-            let (a, b) = (corners[i] - point, corners[(i + 1) % corners.len()] - point);
-            let cross = a.cross(b);
-            cross.length().atan2(a.dot(b)) * normal.dot(cross.normalize_or_zero())
-        })
-        .sum();
-    0.5 * radiance * sum.abs()
-}
-
-/// Form factor from a point to a parallel rectangle `a` x `b` at height `h` with one corner above the point.
-pub fn corner_form_factor(a: f64, b: f64, h: f64) -> f64 {
-    let (x, y) = (a / h, b / h);
-    let (rx, ry) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
-    (x / rx * (y / rx).atan() + y / ry * (x / ry).atan()) / (2.0 * PI)
-}
-
-/// Attenuation of a glTF spot light at angle `theta` from its axis (`KHR_lights_punctual`), all in radians.
-pub fn spot_attenuation(theta: f64, inner: f64, outer: f64) -> f64 {
-    let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
-    ((theta.cos() - outer.cos()) * scale).clamp(0.0, 1.0).powi(2)
-}
-
-/// Radiance inside a closed room whose walls emit `le` and have albedo `rho`, with `max_bounces` scatterings after
-/// the first: what the eye sees is `max_bounces + 2` terms of the geometric series.
-pub fn closed_room(le: f64, rho: f64, max_bounces: u32) -> f64 {
-    le * (1.0 - rho.powi(max_bounces as i32 + 2)) / (1.0 - rho)
-}
 
 /// Fresnel reflectance by Schlick's formula with f90 = 1.
 fn schlick(f0: f64, cosine: f64) -> f64 {

@@ -4,7 +4,7 @@
 //! faults, [`scenes`] the scenes, [`smooth`] meshes with normals, [`pictures`] rendering over seeds and reading stored
 //! pictures, [`reference`] the verdict on our mean of a reference scene.
 // Every test target compiles this module anew and uses its own part of it.
-#![allow(dead_code)]
+#![allow(dead_code, unused_imports)]
 
 pub mod closed;
 pub mod pictures;

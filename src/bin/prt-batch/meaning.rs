@@ -2,16 +2,18 @@
 
 use crate::args::{FileArgs, RunArgs};
 use crate::config::{Config, Definition, Layer};
+use crate::parse;
 use clap::ArgMatches;
 use prt::batch::input::expand;
 use prt::batch::{CameraSource, EnvironmentSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
 use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
-use prt::render::RenderSettings;
+use prt::render::{RenderSettings, Stopping};
 use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What is to be done, of the command line and its config file.
 #[derive(Debug)]
@@ -64,7 +66,9 @@ impl Meaning {
                     let settings = match by_options.get(&merged) {
                         Some(settings) => Arc::clone(settings),
                         None => {
-                            let settings = definition.options(&merged).and_then(|args| file_settings(&args.file));
+                            let settings = definition
+                                .options(&merged)
+                                .and_then(|args| file_settings(&args.file, run.batch_time_limit));
                             Arc::new(settings.map_err(|why| match about.is_empty() {
                                 true => why,
                                 false => format!("{}: {why}", input.path.display()),
@@ -106,14 +110,24 @@ fn no_input(config: Option<&Path>) -> String {
     text
 }
 
-/// How a file is rendered.
+/// Samples per pixel where nothing is said about when sampling ends.
+const DEFAULT_SPP: u32 = 64;
+
+/// How a file is rendered, in a run with that limit.
 ///
 /// # Errors
-/// An option lacks another; the text names both.
-pub fn file_settings(args: &FileArgs) -> Result<FileSettings, String> {
+/// An option lacks another, or excludes it; the text names both.
+pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Result<FileSettings, String> {
+    let stopping = Stopping { target_error: args.target_error, time_limit: args.time_limit, ..Stopping::default() };
+    let default_spp = if stopping.is_open() || batch_time_limit.is_some() { parse::MAX_SPP } else { DEFAULT_SPP };
+    if args.aov.is_some() && args.no_exr {
+        return Err("--aov needs the EXR, whose layers it is about, and --no-exr is given".into());
+    }
     let render = RenderSettings {
         crop: args.crop,
-        spp: args.spp,
+        spp: args.spp.unwrap_or(default_spp),
+        stopping,
+        layers: args.aov.unwrap_or_default(),
         seed: args.seed,
         max_bounces: args.max_bounces,
         filter: args.filter,

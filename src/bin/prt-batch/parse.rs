@@ -8,15 +8,16 @@ use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
-use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers};
 use prt::verify::contenders::Backend;
 use std::ffi::OsStr;
 use std::str::FromStr;
+use std::time::Duration;
 
 /// Most pixels along one side.
 const MAX_SIDE: u32 = prt::batch::MAX_SIDE;
 /// Most samples per pixel: 2^20, where the sampler's sequences end.
-const MAX_SPP: u32 = 1 << 20;
+pub const MAX_SPP: u32 = 1 << 20;
 
 /// A whole number from `least` to `most`.
 fn number<T: FromStr + PartialOrd + std::fmt::Display>(value: &str, least: T, most: T) -> Result<T, String> {
@@ -85,6 +86,59 @@ pub fn env_scale(value: &str) -> Result<f64, String> {
 
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
+}
+
+/// An error, as a share.
+pub fn target_error(value: &str) -> Result<f64, String> {
+    let inside = |error: &f64| *error > 0.0 && *error <= 1.0;
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    number(value).filter(inside).ok_or_else(|| {
+        let percent = value.strip_suffix('%').and_then(number).map(|percent| percent / 100.0).filter(inside);
+        let meant = percent.map_or_else(String::new, |share| format!("; did you mean {share}?"));
+        format!("must be a number above 0 and at most 1, such as 0.01 for 1 %{meant}")
+    })
+}
+
+/// A time, above 0 and at most a year.
+pub fn duration(value: &str) -> Result<Duration, String> {
+    const MOST: f64 = 365.0 * 86_400.0;
+    const UNITS: [(char, f64); 3] = [('s', 1.0), ('m', 60.0), ('h', 3600.0)];
+    let plain = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.');
+    let number = |text: &str| text.parse::<f64>().ok().filter(|_| plain(text));
+    let inside = |seconds: &f64| *seconds >= 0.001 && *seconds <= MOST;
+    let found = UNITS.iter().find_map(|(unit, seconds)| Some(number(value.strip_suffix(*unit)?)? * seconds));
+    found.filter(inside).map(Duration::from_secs_f64).ok_or_else(|| {
+        let seconds = number(value).filter(inside).map_or_else(String::new, |_| format!("; did you mean {value}s?"));
+        format!("must be a time such as 30s, 5m, 1h or 0.5s, from 0.001s to 8760h{seconds}")
+    })
+}
+
+const AOVS: Words<Layers> = Words::new(
+    &[("variance", Layers { variance: true, samples: false }), ("samples", Layers { variance: false, samples: true })],
+    &["albedo", "normal", "depth", "position", "uv", "object-id", "material-id", "cryptomatte"],
+);
+
+fn aov(value: &str) -> Result<Layers, String> {
+    value.split(',').try_fold(Layers::default(), |all, word| {
+        let Layers { variance, samples } = AOVS.find(word.trim())?;
+        Ok(Layers { variance: all.variance || variance, samples: all.samples || samples })
+    })
+}
+
+/// Words of layers with commas between.
+#[derive(Clone)]
+pub struct AovParser;
+
+impl TypedValueParser for AovParser {
+    type Value = Layers;
+
+    fn parse_ref(&self, cmd: &clap::Command, arg: Option<&clap::Arg>, value: &OsStr) -> Result<Layers, clap::Error> {
+        aov.parse_ref(cmd, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(AOVS.possible_values().into_iter()))
+    }
 }
 
 pub fn seed(value: &str) -> Result<u64, String> {
@@ -248,7 +302,8 @@ pub fn bench_rounds(value: &str) -> Result<usize, String> {
 }
 
 pub fn verify() -> Words<What> {
-    Words::new(&[("hits", What::Hits), ("materials", What::Materials)], &["light", "lens", "shapes", "output"])
+    const BUILT: [(&str, What); 3] = [("hits", What::Hits), ("materials", What::Materials), ("light", What::Light)];
+    Words::new(&BUILT, &["lens", "shapes", "output"])
 }
 
 pub fn backend() -> Words<Backend> {

@@ -21,21 +21,6 @@ const fn option(heading: &'static str, name: &'static str, value: &'static str, 
 const OPTIONS: &[Unbuilt] = &[
     option(
         "Sampling",
-        "target-error",
-        "E",
-        "Stop when the upper end of the 95 % interval of the estimated relative error (sqrt of relMSE, below) is <= E; \
-         with it or a time limit --spp is the most, by itself 2^20 [default: off]",
-    ),
-    option(
-        "Sampling",
-        "time-limit",
-        "30s",
-        "Stop an image's sampling; ends only at wave boundaries, and the JSON says the spp reached, with which the \
-         bytes can be repeated [default: off]",
-    ),
-    option("Sampling", "batch-time-limit", "8h", "Share a whole batch's time [default: off]"),
-    option(
-        "Sampling",
         "clamp",
         "C",
         "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
@@ -51,13 +36,6 @@ const OPTIONS: &[Unbuilt] = &[
     option("Lens", "focus-on", "NODE", "Focus on a node in place of a distance"),
     option("Lens", "aperture-blades", "N", "Corners of the aperture [default: from the file, else round]"),
     option("Lens", "sensor", "MM", "The longer side of the image [default: from the file, else 36]"),
-    option(
-        "Files",
-        "aov",
-        "LIST",
-        "EXR layers out of albedo,normal,depth,position,uv,object-id,material-id,cryptomatte,\
-         variance,samples [default: none]",
-    ),
     option("Files", "transparent", "", "Alpha from coverage; background not in the beauty [default: off: alpha 1]"),
     option(
         "Animation",

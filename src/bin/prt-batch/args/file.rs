@@ -9,8 +9,9 @@ use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
-use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Layers};
 use std::path::PathBuf;
+use std::time::Duration;
 
 const PICTURES: &str = "Pictures";
 const CAMERAS: &str = "Cameras";
@@ -93,11 +94,25 @@ pub struct FileArgs {
     #[arg(conflicts_with_all = ["camera_from", "camera"])]
     pub yfov: Option<f64>,
 
-    /// Samples per pixel
+    /// Samples per pixel; the most, with a target or a time limit [default: 64; 2^20 with a target or a time limit]
     ///
     /// From 1 to 2^20.
-    #[arg(short, long, value_name = "N", default_value = "64", value_parser = parse::spp, help_heading = SAMPLING)]
-    pub spp: u32,
+    #[arg(short, long, value_name = "N", value_parser = parse::spp, help_heading = SAMPLING)]
+    pub spp: Option<u32>,
+    /// Stop when the error of the picture is at most E, such as 0.01 [default: off]
+    ///
+    /// When the upper end of the 95 % interval of the estimated relative error (sqrt of relMSE, below) is at most E,
+    /// from 64 samples on; above 0 and at most 1. See "When sampling ends" below.
+    #[arg(long, value_name = "E", value_parser = parse::target_error, allow_hyphen_values = true)]
+    #[arg(help_heading = SAMPLING)]
+    pub target_error: Option<f64>,
+    /// Stop sampling an image after this time, such as 30s, 5m or 1h [default: off]
+    ///
+    /// Every image gets one sample per pixel at least; the JSON says how many it got, and with that --spp the same
+    /// bytes come again.
+    #[arg(long, value_name = "TIME", value_parser = parse::duration, allow_hyphen_values = true)]
+    #[arg(help_heading = SAMPLING)]
+    pub time_limit: Option<Duration>,
     /// Same seed, same pixels
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
     pub seed: u64,
@@ -178,6 +193,13 @@ pub struct FileArgs {
     #[arg(long, value_name = "NAME", default_value = "zip", value_parser = parse::exr_compression())]
     #[arg(help_heading = FILES)]
     pub exr_compression: ExrCompression,
+    /// EXR layers, separated by commas [default: none]
+    ///
+    /// variance: variance.R, .G, .B, the variance of the pixel's mean, on the safe side (float whatever --exr says).
+    /// samples: how many samples are in it.
+    #[arg(long, value_name = "LIST", value_parser = parse::AovParser, hide_possible_values = true)]
+    #[arg(allow_hyphen_values = true, help_heading = FILES)]
+    pub aov: Option<Layers>,
     /// Write no PNG
     #[arg(long, help_heading = FILES)]
     pub no_png: bool,

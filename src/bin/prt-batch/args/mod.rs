@@ -33,6 +33,7 @@ Examples:
   prt-batch a.glb --camera Main --crop 100,50,64,64
   prt-batch models/ --camera-from studio.gltf  every file as the cameras of another see it
   prt-batch a.glb --eye 3,2,5 --look-at 0,1,0  from a place of your own
+  prt-batch scenes/ --target-error 0.01        every picture until its error is 1 % (--time-limit 10m, at most)
   prt-batch --config night.toml                a batch from a file: inputs, options, options of single files
   prt-batch scenes/*.gltf --json > result.json
   prt-batch compare renders/a.exr reference/a.exr --max-relmse 1e-3

@@ -4,6 +4,7 @@ use crate::parse::{self, ProgressStyle};
 use clap::{Args, ValueHint};
 use prt::batch::memory::MemoryLimit;
 use std::path::PathBuf;
+use std::time::Duration;
 
 const RUN: &str = "Run";
 const TERMINAL: &str = "Terminal";
@@ -22,6 +23,13 @@ pub struct RunArgs {
     /// blocks. See "Config files" in docs/cli.md.
     #[arg(long, value_name = "FILE.toml", help_heading = RUN, value_hint = ValueHint::FilePath)]
     pub config: Option<PathBuf>,
+    /// Time for all images together, such as 8h [default: off]
+    ///
+    /// From the start of the run. Each image may use an equal share of what is left for those that are left; one that
+    /// needs less leaves the rest to the others. Every image gets one sample per pixel at least. See "When sampling
+    /// ends" below.
+    #[arg(long, value_name = "TIME", value_parser = parse::duration, allow_hyphen_values = true, help_heading = RUN)]
+    pub batch_time_limit: Option<Duration>,
     /// Worker threads; they do not change a byte of a picture [default: the cores this process may use]
     ///
     /// From 1 to 4096; more than the cores gives a warning.
@@ -43,7 +51,7 @@ pub struct RunArgs {
     /// Up-to-date outputs are kept and reported so; what is up to date is said in docs/cli.md.
     #[arg(long, help_heading = RUN)]
     pub force: bool,
-    /// Count as failures what is lost: content, non-finite samples, empty scenes
+    /// Count as failures what is lost: content, non-finite samples, empty scenes, missed error targets
     ///
     /// Dropped non-finite samples, missed error targets, empty scenes and lost content give exit code 1.
     #[arg(long, help_heading = RUN)]

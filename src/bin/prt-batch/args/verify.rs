@@ -12,13 +12,26 @@ pub enum What {
     Hits,
     /// What materials reflect.
     Materials,
+    /// What pixels show.
+    Light,
+}
+
+impl What {
+    /// As users call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hits => "hits",
+            Self::Materials => "materials",
+            Self::Light => "light",
+        }
+    }
 }
 
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
     /// What is verified
     ///
-    /// hits: what rays hit, by every backend against f64. materials: energy, sampling and reciprocity of what they reflect.
+    /// hits: what rays hit, by every backend against f64. materials: energy, sampling and reciprocity of what they reflect. light: built-in scenes whose pixels can be written down.
     #[arg(value_name = "WHAT", default_value = "hits", value_parser = parse::verify())]
     pub what: What,
     /// .gltf, .glb and .obj files, or folders of them [default: the built-in meshes or materials]
@@ -29,7 +42,7 @@ pub struct VerifyArgs {
     /// hits: rays of each kind at each mesh or scene [default: 5000]
     #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub rays: Option<usize>,
-    /// materials: samples of each chi-square test [default: 100000]
+    /// materials: samples of each chi-square test [default: 100000]; light: samples of a pixel [default: 1024]
     #[arg(long, value_name = "N", value_parser = parse::samples)]
     pub samples: Option<usize>,
     /// materials: random ones besides the built-in grid [default: 0]
@@ -38,9 +51,9 @@ pub struct VerifyArgs {
     /// Other seeds, other rays and samples
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed)]
     pub seed: u64,
-    /// hits: ray backends, separated by commas [default: all that are to be had]
+    /// hits: ray backends, separated by commas [default: all that are to be had]; light: one [default: auto]
     ///
-    /// linear, brute force, takes part where there are at most 1000 triangles.
+    /// linear, brute force, takes part in hits where there are at most 1000 triangles.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::backend())]
     pub accel: Vec<Backend>,
     /// Worker threads; they do not change what is found [default: the cores this process may use]
@@ -51,7 +64,7 @@ pub struct VerifyArgs {
     /// Its fields are below.
     #[arg(long)]
     pub json: bool,
-    /// A row for every kind of rays or every material, and more rays to repeat faults with
+    /// A row for every kind of rays, every material or every scene, and more rays to repeat faults with
     #[arg(short, long)]
     pub verbose: bool,
 }

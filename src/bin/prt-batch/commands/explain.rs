@@ -2,6 +2,7 @@
 
 use crate::term;
 use prt::batch::explain::{CameraPlan, Explanation, MemoryPlan, Prospect, explain};
+use prt::batch::fingerprint::StoppingRecord;
 use prt::batch::memory::amount;
 use prt::batch::{BatchSettings, Stop, report};
 use prt::render::Considered;
@@ -81,7 +82,9 @@ fn text(plan: &Explanation) -> String {
         let crop = plan.crop.map_or_else(String::new, |[x, y, w, h]| format!(", of it {w} x {h} at {x},{y}"));
         let paths = plan.paths.map_or_else(String::new, |paths| format!(", {} paths", grouped(paths)));
         let (spp, seed) = (plan.spp, plan.seed);
-        lines.add("picture", format!("{width} x {height} pixels{crop}, {spp} spp{paths}, seed {seed}"));
+        let most = if plan.stopping.is_some() { "at most " } else { "" };
+        lines.add("picture", format!("{width} x {height} pixels{crop}, {most}{spp} spp{paths}, seed {seed}"));
+        lines.list("ends", plan.stopping.iter().map(stopping_text));
         lines.add("scene", scene.to_string());
     }
     if let Some(camera) = &plan.camera {
@@ -142,6 +145,17 @@ fn text(plan: &Explanation) -> String {
     lines.list("note", plan.notes.iter().cloned());
     lines.list("warning", plan.warnings.iter().cloned());
     lines.0 + "\n"
+}
+
+/// What may end sampling before the most samples.
+fn stopping_text(stopping: &StoppingRecord) -> String {
+    let error = stopping.target_error.map(|error| format!("the error is at most {}", report::percent(error)));
+    let time = stopping.time_limit.map(|limit| format!("{} of sampling are over", report::seconds(limit)));
+    let batch = stopping
+        .batch_time_limit
+        .map(|limit| format!("its equal share is over of what is left of {} for all images", report::seconds(limit)));
+    let ends: Vec<_> = error.into_iter().chain(time).chain(batch).collect();
+    format!("when {}, or with the last sample", ends.join(", or "))
 }
 
 fn camera_text(camera: &CameraPlan) -> String {

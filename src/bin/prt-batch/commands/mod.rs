@@ -8,4 +8,5 @@ mod exr_files;
 pub mod render;
 pub mod retone;
 pub mod verify;
+mod verify_light;
 mod verify_materials;

@@ -17,6 +17,7 @@ pub fn run(matches: &ArgMatches) -> ExitCode {
         out: args.out.clone(),
         threads: args.threads,
         memory: args.memory,
+        batch_time_limit: args.batch_time_limit,
         force: args.force,
         strict: args.strict,
         report: !args.no_report,

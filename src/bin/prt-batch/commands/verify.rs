@@ -23,14 +23,19 @@ pub fn run(args: &VerifyArgs) -> ExitCode {
     let refused = match args.what {
         What::Hits => [("samples", args.samples.is_some()), ("random", args.random.is_some())],
         What::Materials => [("rays", args.rays.is_some()), ("accel", !args.accel.is_empty())],
+        What::Light => [("rays", args.rays.is_some()), ("random", args.random.is_some())],
     };
     if let Some((name, _)) = refused.iter().find(|(_, is_given)| *is_given) {
-        let what = if args.what == What::Hits { "hits" } else { "materials" };
-        return term::usage(&format!("--{name} means nothing to verify {what}; leave it out"));
+        return term::usage(&format!("--{name} means nothing to verify {}; leave it out", args.what.name()));
     }
-    if args.what == What::Materials {
-        return super::verify_materials::run(args);
+    match args.what {
+        What::Hits => hits_of(args),
+        What::Materials => super::verify_materials::run(args),
+        What::Light => super::verify_light::run(args),
     }
+}
+
+fn hits_of(args: &VerifyArgs) -> ExitCode {
     let (backends, embree) = match backends(&args.accel) {
         Ok(backends) => backends,
         Err(message) => return failed(&message),

@@ -2,7 +2,7 @@
 
 use super::style::Paint;
 use super::text::{count, indented, mrays_per_s, printable, seconds};
-use prt::batch::report::{Accel, ImageReport, Status};
+use prt::batch::report::{Accel, ImageReport, Status, percent};
 
 /// A name that no other image of the run has: its first output, else its input.
 pub fn name(image: &ImageReport) -> String {
@@ -21,6 +21,9 @@ pub fn line(image: &ImageReport, paint: Paint) -> String {
     line += &format!("  {}  {} spp  {}", size(image).unwrap_or_default(), image.spp, seconds(image.seconds.total));
     if let Some(speed) = image.mrays_per_s {
         line += &format!("  {}", mrays_per_s(speed));
+    }
+    if let Some(error) = image.estimated_error.as_ref().filter(|_| image.target_error.is_some()) {
+        line += &format!("  error {}", error.percent());
     }
     line
 }
@@ -65,6 +68,19 @@ pub fn details(image: &ImageReport) -> Vec<String> {
     if !known.is_empty() {
         lines.push(format!("  {}", known.join(", ")));
     }
+    if let Some(error) = &image.estimated_error {
+        let [low, high] = error.ci95.map(percent);
+        let by = image.stopped_by.as_deref().filter(|by| *by != "spp");
+        let by = by.map_or(String::new(), |by| format!("; ended by --{by}"));
+        let worst = image
+            .worst_tile
+            .as_ref()
+            .map_or(String::new(), |worst| format!("; worst at {},{}: {}", worst.x, worst.y, percent(worst.error)));
+        let above = image.target_error.as_ref().and_then(|target| target.pixels_above);
+        let above =
+            above.map_or(String::new(), |share| format!("; {:.0} % of the pixels above the target", 100.0 * share));
+        lines.push(format!("  error {} ({low} to {high}){by}{worst}{above}", error.percent()));
+    }
     if let (Some(rays), Some(triangles)) = (&image.rays, image.triangles) {
         let (camera, bounce, shadow) = (rays.camera, rays.bounce, rays.shadow);
         let triangles = count(triangles, "triangle");
@@ -77,7 +93,7 @@ pub fn details(image: &ImageReport) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use prt::batch::report::{Outputs, Rays, Seconds};
+    use prt::batch::report::{EstimatedError, Outputs, Rays, Seconds, TargetError, WorstTile};
 
     fn rendered() -> ImageReport {
         ImageReport {
@@ -100,6 +116,31 @@ mod tests {
         assert_eq!(line(&rendered(), Paint::OFF), "renders/cornell.exr  1280x720  64 spp  3.1 s  82 Mray/s");
         let empty = ImageReport { status: Status::Empty, outputs: Outputs::default(), ..rendered() };
         assert_eq!(line(&empty, Paint::OFF), "scenes/cornell.gltf: empty");
+    }
+
+    #[test]
+    fn an_image_with_a_target_says_how_near_it_came() {
+        let image = ImageReport {
+            estimated_error: Some(EstimatedError {
+                metric: "sqrt-relmse".into(),
+                value: 0.0093,
+                ci95: [0.0087, 0.00994],
+            }),
+            stopped_by: Some("target-error".into()),
+            target_error: Some(TargetError { target: 0.01, met: true, pixels_above: Some(0.31) }),
+            worst_tile: Some(WorstTile { x: 32, y: 64, width: 16, height: 16, error: 0.0512 }),
+            ..rendered()
+        };
+        assert!(line(&image, Paint::OFF).ends_with("  64 spp  3.1 s  82 Mray/s  error 0.93 %"));
+        assert_eq!(
+            details(&image)[1],
+            "  error 0.93 % (0.87 % to 0.99 %); ended by --target-error; worst at 32,64: 5.1 %; 31 % of the pixels above \
+             the target"
+        );
+        let missed = TargetError { met: false, ..image.target_error.clone().unwrap() };
+        let image = ImageReport { target_error: Some(missed), ..image };
+        let told = "scenes/cornell.gltf: counts as failed (--strict): --target-error 0.01 was not reached";
+        assert_eq!(strict_failure(&image).as_deref(), Some(told));
     }
 
     #[test]

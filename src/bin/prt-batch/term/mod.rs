@@ -7,6 +7,7 @@ mod bars;
 mod board;
 mod image_lines;
 mod json_lines;
+pub mod light_table;
 pub mod materials_table;
 mod output;
 mod plain;
