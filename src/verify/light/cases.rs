@@ -269,7 +269,7 @@ fn rooms() -> Vec<Case> {
         let case = Case::new(name, "INT-02", room(0.5, 0.5), closed_room(0.5, 0.5, bounces));
         all.push(Case { max_bounces: Some(bounces), ..case });
     }
-    all.push(Case::new("closed room of albedo 0.9", "INT-03", room(0.9, 0.1), 1.0).effort(4));
+    all.push(Case::new("closed room of albedo 0.9", "INT-03", room(0.9, 0.1), 1.0).effort(16));
 
     // A light anywhere in a ball: what is scattered is the same everywhere.
     let (rho, intensity, light) = (0.7_f32, 2.0, DVec3::new(0.3, 0.2, -0.4));
