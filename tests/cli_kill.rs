@@ -47,10 +47,14 @@ fn kill(moments: u64) {
         let scene = SCENE.replacen("0.25", &format!("0.{}5", 1 + i), 1);
         fs::write(root.path().join(format!("scenes/s{i}.gltf")), scene).unwrap();
     }
-    let clock = Instant::now();
-    assert!(command(root.path(), "undisturbed").status().unwrap().success());
-    let whole_run = clock.elapsed();
-    let expected = pictures(&root.path().join("undisturbed"));
+    // The shortest of three, so that the moments do not miss the run where other work made one of them long.
+    let run = |i| {
+        let clock = Instant::now();
+        assert!(command(root.path(), &format!("undisturbed{i}")).status().unwrap().success());
+        clock.elapsed()
+    };
+    let whole_run = (0..3).map(run).min().unwrap();
+    let expected = pictures(&root.path().join("undisturbed0"));
     assert_eq!(expected.len(), 2 * SCENES);
 
     let out = root.path().join("out");

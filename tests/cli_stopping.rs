@@ -65,7 +65,7 @@ fn a_picture_that_was_ended_is_byte_for_byte_that_of_its_number_of_samples() {
     };
     let spp = [
         by_error("0.3", &["--threads", "1"], &[]),
-        by_error("0.14", &["--threads", "2"], &[]),
+        by_error("0.1", &["--threads", "2"], &[]),
         by_error("0.17", &["--threads", "2"], &["--crop", "5,3,30,20"]),
         // The most, between the ends of waves.
         by_error("0.01", &["--spp", "70"], &[]),

@@ -20,6 +20,8 @@ const FAST_PAIR: f64 = 1.292_893;
 /// The mean square difference of a net and the half that follows it, over 1.5, in the fast part of a half: that net's
 /// fast part is 2^-1.5 of a half's, and they are correlated by c as well, so (1 + 2^-1.5 (1 - 2 c)) / 1.5.
 const FAST_THIRD: f64 = 1.040_440;
+/// Halves and quarters are taken to disagree about the variance by this factor at most.
+const MOST_DOUBT: f64 = 16.0;
 /// Twice the correlation of halves of a net, negative: 2 - 2^0.5.
 const MENDED: f64 = 0.585_786;
 /// Side of the squares of pixels that are left out in turn to learn how sure the estimate is; they lie on the whole
@@ -103,6 +105,8 @@ struct Variance {
     slow: f64,
     fast: f64,
     half: f64,
+    /// Logarithm of the factor by which halves and quarters disagree beyond what the model allows.
+    doubt: f64,
 }
 
 impl Variance {
@@ -167,13 +171,28 @@ impl Halves {
         Differences { halves, quarters }
     }
 
+    /// Beyond what the model allows, the mean (of logarithms) of what halves and what quarters say: the variance of smooth
+    /// light falls in steps, at every other power of two, so that either alone is up to three times off.
     fn variance(&self, found: Differences) -> Variance {
-        // Of quarters: twice the slow part, 2^1.5 times the fast one.
+        let half = f64::from(self.size);
+        if found.halves <= 0.0 && found.quarters <= 0.0 {
+            return Variance { slow: 0.0, fast: 0.0, half, doubt: 0.0 };
+        }
         // A difference of sums may be just below nothing.
-        let halves = found.halves.max(0.0);
-        let fast = (found.quarters - 2.0 * halves) / (8.0_f64.sqrt() * FAST_PAIR - 2.0 * self.fast);
-        let fast = fast.min(halves / self.fast).max(0.0);
-        Variance { slow: halves - self.fast * fast, fast, half: f64::from(self.size) }
+        let [halves, quarters] = [found.halves, found.quarters].map(|d| d.max(f64::MIN_POSITIVE));
+        // Of quarters: twice the slow part, 2^1.5 times the fast one.
+        let [all_slow, all_fast] = [2.0 * halves, 8.0_f64.sqrt() * FAST_PAIR / self.fast * halves];
+        if quarters > all_fast {
+            let doubt = (quarters / all_fast).min(MOST_DOUBT);
+            return Variance { slow: 0.0, fast: halves / self.fast * doubt.sqrt(), half, doubt: doubt.ln() };
+        }
+        if quarters < all_slow {
+            let doubt = (all_slow / quarters).min(MOST_DOUBT);
+            return Variance { slow: halves / doubt.sqrt(), fast: 0.0, half, doubt: doubt.ln() };
+        }
+        let fast = (quarters - all_slow) / (8.0_f64.sqrt() * FAST_PAIR - 2.0 * self.fast);
+        let fast = fast.min(halves / self.fast);
+        Variance { slow: halves - self.fast * fast, fast, half, doubt: 0.0 }
     }
 
     /// The variance of the mean of `spp` samples of one channel of a pixel, by so few differences that only the slow part
@@ -246,7 +265,8 @@ impl Film {
             deviation *= (share - 1.0) / share;
             deviation += (0.5 * (value / error(all.by_own, count)).ln()).powi(2);
         }
-        let reach = (Z95 * (deviation + MODEL * MODEL).sqrt()).exp();
+        let doubt = 0.5 * halves.variance(all.differences).doubt;
+        let reach = (Z95 * (deviation + MODEL * MODEL + doubt * doubt).sqrt()).exp();
         let squares = places.iter().zip(&cells).map(|(&pixels, cell)| {
             let error = error(cell.differences, pixels.area() as f64);
             Square { pixels, error }

@@ -42,7 +42,7 @@ pub struct VerifyArgs {
     /// hits: rays of each kind at each mesh or scene [default: 5000]
     #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub rays: Option<usize>,
-    /// materials: samples of each chi-square test [default: 100000]; light: samples of a pixel [default: 1024]
+    /// materials: samples of each chi-square test; light: samples of a pixel [default: 100000 and 1024]
     #[arg(long, value_name = "N", value_parser = parse::samples)]
     pub samples: Option<usize>,
     /// materials: random ones besides the built-in grid [default: 0]
@@ -51,7 +51,7 @@ pub struct VerifyArgs {
     /// Other seeds, other rays and samples
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed)]
     pub seed: u64,
-    /// hits: ray backends, separated by commas [default: all that are to be had]; light: one [default: auto]
+    /// hits: ray backends, separated by commas; light: one [default: all that are to be had; auto for light]
     ///
     /// linear, brute force, takes part in hits where there are at most 1000 triangles.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse::backend())]
