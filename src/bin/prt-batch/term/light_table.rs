@@ -1,6 +1,6 @@
 //! The table of `prt-batch verify light`.
 
-use super::text::{pad_end, pad_start, width};
+use super::text::columns;
 use prt::verify::light::{LightReport, Report};
 
 const HEAD: [&str; 7] = ["scene", "test", "exact", "off by", "standard error", "z", "verdict"];
@@ -9,15 +9,9 @@ const HEAD: [&str; 7] = ["scene", "test", "exact", "off by", "standard error", "
 pub fn text(report: &Report) -> String {
     let mut rows = vec![HEAD.map(str::to_owned)];
     rows.extend(report.cases.iter().map(row));
-    let widths: [usize; HEAD.len()] = std::array::from_fn(|i| rows.iter().map(|row| width(&row[i])).max().unwrap_or(0));
     let Report { seed, seeds, samples, .. } = report;
     let mut text = format!("seeds {seed} to {}; {samples} samples a pixel or more\n\n", seed + seeds - 1);
-    for row in &rows {
-        let is_word = |i: usize| i < 2 || i == HEAD.len() - 1;
-        let cell = |i: usize| if is_word(i) { pad_end(&row[i], widths[i]) } else { pad_start(&row[i], widths[i]) };
-        text += (0..HEAD.len()).map(cell).collect::<Vec<_>>().join("  ").trim_end();
-        text += "\n";
-    }
+    text += &columns(&rows, |i| i < 2 || i == HEAD.len() - 1);
     let wrong = report.cases.iter().filter(|case| case.problem.is_some()).count();
     text += &format!(
         "\n{} scenes, {wrong} wrong\n{}\n",

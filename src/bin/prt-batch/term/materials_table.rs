@@ -1,6 +1,6 @@
 //! The table of `prt-batch verify materials`.
 
-use super::text::{pad_end, pad_start, printable, width};
+use super::text::{columns, printable};
 use prt::verify::materials::{MaterialReport, Report};
 
 const HEAD: [&str; 8] =
@@ -11,15 +11,9 @@ pub fn text(report: &Report, all: bool) -> String {
     let broken = report.materials.iter().filter(|m| !m.problems.is_empty()).count();
     let mut rows = vec![HEAD.map(str::to_owned)];
     rows.extend(report.materials.iter().filter(|m| all || !m.problems.is_empty()).map(row));
-    let widths: [usize; HEAD.len()] = std::array::from_fn(|i| rows.iter().map(|row| width(&row[i])).max().unwrap_or(0));
     let mut text = format!("seed {}; {} samples of each distribution\n\n", report.seed, report.samples);
     if rows.len() > 1 {
-        for row in &rows {
-            let is_word = |i: usize| i == 0 || i == HEAD.len() - 1;
-            let cell = |i: usize| if is_word(i) { pad_end(&row[i], widths[i]) } else { pad_start(&row[i], widths[i]) };
-            text += (0..HEAD.len()).map(cell).collect::<Vec<_>>().join("  ").trim_end();
-            text += "\n";
-        }
+        text += &columns(&rows, |i| i == 0 || i == HEAD.len() - 1);
         text += "\n";
     }
     let tested = report.materials.iter().filter(|m| m.p_value.is_some()).count();

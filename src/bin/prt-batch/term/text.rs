@@ -18,6 +18,17 @@ pub fn pad_start(text: &str, columns: usize) -> String {
     format!("{}{text}", " ".repeat(columns.saturating_sub(width(text))))
 }
 
+/// `rows` below each other, two spaces between columns: those of words from the left, the others from the right.
+pub fn columns<const N: usize>(rows: &[[String; N]], is_word: impl Fn(usize) -> bool) -> String {
+    let widths: [usize; N] = std::array::from_fn(|i| rows.iter().map(|row| width(&row[i])).max().unwrap_or(0));
+    let pad = |row: &[String; N], i: usize| match is_word(i) {
+        true => pad_end(&row[i], widths[i]),
+        false => pad_start(&row[i], widths[i]),
+    };
+    let line = |row| (0..N).map(|i| pad(row, i)).collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n";
+    rows.iter().map(line).collect()
+}
+
 /// The longest beginning of `chars` that fits into `columns`, and its width.
 fn beginning(chars: impl Iterator<Item = char>, columns: usize) -> (Vec<char>, usize) {
     let (mut taken, mut used) = (Vec::new(), 0);
