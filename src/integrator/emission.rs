@@ -51,8 +51,8 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
             let cos = si.wo.dot(si.ng);
             le = le.scale(materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, lit));
         }
-        // Weighed against having sampled the same point as a light. The ray
-        // that found it came straight from the last scattering; only camera rays may have passed a culled surface.
+        // Weighed against having sampled the same point as a light. The ray that found it came straight from the last
+        // scattering; only camera rays may have passed a culled surface.
         // Nothing samples what is no light, nor what camera rays and mirrors show.
         let light = si.triangle.light;
         let sampled = lit & prev_pdf.is_finite() & !light.eq(L::U::splat(NONE));

@@ -156,7 +156,7 @@ impl<L: Lanes> Element<L> {
         let Self { records, pmf, density, .. } = self;
         let Sources { triangles, materials, textures } = *sources;
         let normal = self.normal.records(elements);
-        let xyz = xyz::<L>;
+        let xyz = V3::<L>::of_record;
         let ng = xyz(&normal);
         // Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square".
         let half = L::F::splat(0.5);
@@ -212,16 +212,16 @@ impl<L: Lanes> Element<L> {
         let record = &self.records;
         let kind = record[0][3].to_bits();
         let (zero, one) = (L::F::zero(), L::F::one());
-        let place = xyz::<L>(&record[0]);
+        let place = V3::<L>::of_record(&record[0]);
         let is_distant = kind.eq(L::U::splat(DIRECTIONAL));
         let to_light = place - p;
         let distance2 = to_light.dot(to_light);
         let wi = place.or_else(is_distant, to_light.scale(one / distance2.sqrt()));
-        let cos = -(xyz::<L>(&record[1]).dot(wi));
+        let cos = -(V3::<L>::of_record(&record[1]).dot(wi));
         let falloff = ((cos - record[2][1]) * record[2][0]).max(zero).min(one);
         let attenuation = (falloff * falloff).or_else(kind.eq(L::U::splat(SPOT)), one);
         let scale = one.or_else(is_distant, attenuation / distance2);
-        let radiance = xyz::<L>(&record[3]).scale(scale);
+        let radiance = V3::<L>::of_record(&record[3]).scale(scale);
         LightSample {
             radiance,
             wi,
@@ -250,9 +250,4 @@ pub fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: L::F, u
         valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
         total: L::F::zero(),
     }
-}
-
-#[inline(always)]
-fn xyz<L: Lanes>(record: &[L::F; 4]) -> V3<L> {
-    V3::new(record[0], record[1], record[2])
 }

@@ -1,7 +1,8 @@
 //! The lights of a scene: choosing one and a point on it, for next event estimation, and the density of that choice.
 //!
-//! A glowing mesh (each part of it that touches no other) is one light, however many triangles it has; a triangle of it is chosen in proportion to its power. By
-//! inverting distribution functions throughout (not by alias tables, which would undo the stratification of the numbers).
+//! A glowing mesh (each part of it that touches no other) is one light, however many triangles it has; of these one is
+//! chosen in proportion to its area. By inverting distribution functions throughout (not by alias tables, which would undo
+//! the stratification of the numbers).
 
 use super::bounds::Bounds;
 use super::choice::{Candidates, Choice, Receiver, Sky};

@@ -27,6 +27,12 @@ impl<L: Lanes> V3<L> {
         Self::new(L::F::splat(v[0]), L::F::splat(v[1]), L::F::splat(v[2]))
     }
 
+    /// The first three numbers of records.
+    #[inline(always)]
+    pub fn of_record(record: &[L::F; 4]) -> Self {
+        Self::new(record[0], record[1], record[2])
+    }
+
     /// All components zero.
     #[inline(always)]
     pub fn zero() -> Self {

@@ -148,19 +148,14 @@ impl PlacementTable {
         let r6 = (at + L::U::splat(6)).records(&self.records);
         Some(Placed {
             lanes,
-            rows: [xyz::<L>(&r0), xyz::<L>(&r1), xyz::<L>(&r2)],
+            rows: [V3::<L>::of_record(&r0), V3::<L>::of_record(&r1), V3::<L>::of_record(&r2)],
             translation: V3::new(r0[3], r1[3], r2[3]),
-            normal_rows: [xyz::<L>(&r3), xyz::<L>(&r4), xyz::<L>(&r5)],
+            normal_rows: [V3::<L>::of_record(&r3), V3::<L>::of_record(&r4), V3::<L>::of_record(&r5)],
             per_metre: V3::new(r3[3], r4[3], r5[3]),
-            at_origin: xyz::<L>(&r6),
+            at_origin: V3::<L>::of_record(&r6),
             side: r6[3],
         })
     }
-}
-
-#[inline(always)]
-fn xyz<L: Lanes>(r: &[L::F; 4]) -> V3<L> {
-    V3::new(r[0], r[1], r[2])
 }
 
 #[inline(always)]

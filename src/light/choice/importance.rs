@@ -39,7 +39,7 @@ pub type Group<L> = [[<L as Lanes>::F; 4]; 3];
 pub fn of_group<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> (L::F, L::F) {
     let [place, direction, light] = group;
     let (zero, one) = (L::F::zero(), L::F::one());
-    let v = xyz::<L>(place) - at.p;
+    let v = V3::<L>::of_record(place) - at.p;
     let inverse = one / v.dot(v).max(L::F::splat(LEAST_SQUARE)).sqrt();
     let size = place[3] * inverse;
     let inside = size.ge(one);
@@ -50,7 +50,7 @@ pub fn of_group<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> (L::F, L::F) {
 
     // The least angle between a direction that it shines in and one to the point.
     let (cos_cone, two_sided) = (direction[3], light[2].lt(zero));
-    let along = -(xyz::<L>(direction).dot(v) * inverse);
+    let along = -(V3::<L>::of_record(direction).dot(v) * inverse);
     let cos = along.abs().or_else(two_sided, along);
     let sin = safe_sqrt(one - cos * cos);
     let sin_cone = safe_sqrt(one - cos_cone * cos_cone);
@@ -64,7 +64,7 @@ pub fn of_group<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> (L::F, L::F) {
     let hidden = cos_cone.eq(one) & !two_sided & along.lt(-(size * L::F::splat(BEHIND)));
     let shines = zero.or_else(hidden, shines);
 
-    let receives = facing(xyz::<L>(place) - at.p, inverse, at);
+    let receives = facing(v, inverse, at);
     let sin = safe_sqrt(one - receives * receives);
     let receives = one.or_else(inside | receives.ge(cos_ball), receives.mul_add(cos_ball, sin * sin_ball));
     let irradiance = light[0] * square * shines * receives.max(at.least);
@@ -78,10 +78,10 @@ pub fn of_group<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> (L::F, L::F) {
 pub fn of_point<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> L::F {
     let [place, direction, light] = group;
     let (zero, one) = (L::F::zero(), L::F::one());
-    let v = xyz::<L>(place) - at.p;
+    let v = V3::<L>::of_record(place) - at.p;
     let inverse = one / v.dot(v).max(L::F::splat(LEAST_SQUARE)).sqrt();
     let size = (place[3] * inverse).min(one);
-    let cos = -(xyz::<L>(direction).dot(v) * inverse);
+    let cos = -(V3::<L>::of_record(direction).dot(v) * inverse);
     let shines = ((cos - light[1]) * light[2]).max(zero).min(one);
     light[0] * size * size * shines * facing(v, inverse, at).max(at.least)
 }
@@ -89,7 +89,7 @@ pub fn of_point<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> L::F {
 /// The importance of parallel light: direction towards it and illuminance.
 #[inline(always)]
 pub fn of_sun<L: Lanes>(sun: &[L::F; 4], at: &Receiver<L>) -> L::F {
-    sun[3] * facing(xyz::<L>(sun), L::F::one(), at).max(at.least)
+    sun[3] * facing(V3::<L>::of_record(sun), L::F::one(), at).max(at.least)
 }
 
 /// Cosine between the normal and `v` of length 1 / `inverse`.
@@ -97,9 +97,4 @@ pub fn of_sun<L: Lanes>(sun: &[L::F; 4], at: &Receiver<L>) -> L::F {
 fn facing<L: Lanes>(v: V3<L>, inverse: L::F, at: &Receiver<L>) -> L::F {
     let cos = at.n.dot(v) * inverse;
     cos.abs().or_else(at.both_sides, cos)
-}
-
-#[inline(always)]
-fn xyz<L: Lanes>(record: &[L::F; 4]) -> V3<L> {
-    V3::new(record[0], record[1], record[2])
 }

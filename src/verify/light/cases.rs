@@ -9,9 +9,10 @@ use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::material::energy::Brdf;
 use crate::material::extensions::{DiffuseTransmission, Transmission, Volume};
+use crate::math::random::Rng;
 use crate::scene::{Scene, SceneBuilder};
 use crate::texture::Param;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// A scene with the value of its pixels.
@@ -89,12 +90,6 @@ fn lit(lux: f64) -> f64 {
     f64::from(FLOOR) / PI * lux
 }
 
-/// Numbers in [0, 1), the same at every run (Weyl's sequence).
-fn weyl(i: u32, axis: usize) -> f64 {
-    let steps = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_2];
-    (f64::from(i) * steps[axis]).fract()
-}
-
 fn punctual() -> Vec<Case> {
     let mut all = Vec::new();
     let at = DVec3::new(3.0, 1.5, -2.0);
@@ -122,11 +117,10 @@ fn punctual() -> Vec<Case> {
     let value = lit(100.0 * at.normalize().y / at.length_squared());
     all.push(Case::new("10,000 point lights in one place", "LGT-09", b, value).model(1e-4));
 
-    let mut b = floor();
+    let (mut b, mut rng) = (floor(), Rng::new(1));
     let mut lux = 0.0;
     for i in 0..400 {
-        let p = DVec3::new(12.0 * weyl(i, 0) - 6.0, 0.3 + 4.0 * weyl(i, 1), 12.0 * weyl(i, 2) - 6.0);
-        let p = p.as_vec3().as_dvec3();
+        let p = Vec3::new(rng.range(-6.0, 6.0), rng.range(0.3, 4.3), rng.range(-6.0, 6.0)).as_dvec3();
         let intensity = (1 + i % 7) as f32;
         add_light(&mut b, Light::Point { intensity: [intensity; 3] }, p, DVec3::NEG_Y);
         lux += f64::from(intensity) * p.normalize().y / p.length_squared();
@@ -144,7 +138,7 @@ fn rectangle(mut builder: SceneBuilder, corners: [[f32; 3]; 4], radiance: f32, i
 }
 
 fn f64s(corners: [[f32; 3]; 4]) -> [DVec3; 4] {
-    corners.map(|c| glam::Vec3::from(c).as_dvec3())
+    corners.map(|c| Vec3::from(c).as_dvec3())
 }
 
 fn lamps() -> Vec<Case> {
