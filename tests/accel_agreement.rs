@@ -43,6 +43,7 @@ fn fast_backends(triangles: &Triangles) -> Vec<(&'static str, Box<dyn Accel>)> {
     let split = WideBvh::with_splits(triangles, Level::best(), SpatialSplits::Always);
     split.validate(triangles).expect("a sound tree");
     all.push(("with splits", Box::new(split)));
+    all.push(("interleaved", Box::new(WideBvh::build(triangles).interleaved())));
     all
 }
 

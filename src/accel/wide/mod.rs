@@ -49,6 +49,9 @@ const _: () = assert!(3 * build::MAX_DEPTH as usize * (WIDTH - 1) < STACK && STA
 /// Nodes near the root: 512 KB, a part of a core's cache.
 const NEAR: usize = 2048;
 
+/// Bytes of a tree up to which waiting for memory is not worth following several rays at once: 300 000 triangles or so.
+const CACHED: usize = 16 << 20;
+
 /// A tree over all triangles of one object but those of zero area, or over boxes.
 #[derive(Clone, Debug)]
 struct Tree {
@@ -197,6 +200,8 @@ pub struct WideBvh {
     level: Level,
     /// For packets: any.
     packet_level: Level,
+    /// Whether several single rays are under way at once, to wait for memory together.
+    interleaves: bool,
     /// Decides about hits on filtered triangles.
     filter: Option<Arc<dyn HitFilter>>,
 }
@@ -237,7 +242,13 @@ impl WideBvh {
         let boxes: Vec<_> = placements.iter().map(|p| placed_bounds(p).filter(|_| p.is_usable())).collect();
         let world = Space::new(world, boxes, splits);
         let placed = placements.iter().map(Placed::new).collect();
-        Self { world, objects, placed, level, packet_level, filter }
+        let interleaves = world.tree.bytes() > CACHED;
+        Self { world, objects, placed, level, packet_level, interleaves, filter }
+    }
+
+    /// The same with several single rays under way at once, as in a large tree. It changes no hit.
+    pub fn interleaved(self) -> Self {
+        Self { interleaves: true, ..self }
     }
 
     /// What is wrong with the tree over `geometry`, if anything: for tests.

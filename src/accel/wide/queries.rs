@@ -6,7 +6,7 @@ use super::leaf::Nearest;
 use super::node::WIDTH;
 use super::packet::{IntersectPackets, OccludedPackets};
 use super::sort::{IsMixed, Sort, Sorted};
-use super::traverse::{Query, trace};
+use super::traverse::{INTERLEAVED, Query, trace};
 use crate::accel::{HitBatch, MISS, RayBatch};
 use simd::{Kernel, Lanes, dispatch};
 use std::ops::Range;
@@ -63,9 +63,11 @@ impl<W: Which, Q: Query> Kernel for Singles<'_, W, Q> {
         assert!(L::N == WIDTH, "8 children, 8 lanes");
         let Self { bvh, rays, which, query } = self;
         if bvh.has_specials() {
-            trace::<L, Q, true>(bvh, rays, which, query);
+            trace::<L, Q, true, INTERLEAVED>(bvh, rays, which, query);
+        } else if bvh.interleaves {
+            trace::<L, Q, false, INTERLEAVED>(bvh, rays, which, query);
         } else {
-            trace::<L, Q, false>(bvh, rays, which, query);
+            trace::<L, Q, false, 1>(bvh, rays, which, query);
         }
     }
 }

@@ -5,10 +5,11 @@
 //! Packets") and Embree do: 0.85 to 0.95 of the speed in large scenes, 1.0 to 1.05 in small ones; the octant's order
 //! alone: 0.9 in closed rooms, level elsewhere.
 //!
-//! A ray stops at a node that may be far away in memory (any but those next to the root), asks for it, and the next ray
-//! goes on. With 4 rays, against one: 1.1 times the speed with 1.6 million triangles of uneven size, 1.5 in a terrain of
-//! 2 million, 1.0 where the tree is small (2 rays: 1.0 and 1.2; 6: as 4). Stopping at leaves as well: 1.1 times as fast
-//! again in the terrain, 0.9 elsewhere. Asking for what is on top of the stack as well: 0.95 to 0.98. Compressions and masks of
+//! In a tree beyond the caches (`WideBvh::interleaves`) a ray stops at a node that may be far away in memory (any but
+//! those next to the root), asks for it, and the next ray goes on. With 4 rays, against one: 1.5 times the speed in a
+//! terrain of 2 million triangles, 1.1 among a million (2 rays: 1.2; 6: as 4), level at half a million, but 0.88 to 0.95
+//! with up to 300 000, where one ray is followed at a time. Stopping at leaves as well: 1.1 times as fast again in the
+//! terrain, 0.9 elsewhere. Asking for what is on top of the stack as well: 0.95 to 0.98. Compressions and masks of
 //! AVX-512 in 8 lanes in place of AVX2: 0.96 to 0.99. Nothing but what changes is read through the slot: 1.03.
 
 use super::feed::{Feed, Ready, Which, single};
@@ -23,8 +24,8 @@ use crate::accel::{MISS, RayBatch};
 use glam::Vec3;
 use simd::{Float, Lanes, Mask, Uint, prefetch};
 
-/// Rays under way at once.
-const SLOTS: usize = 4;
+/// Rays under way at once where the tree is beyond the caches.
+pub const INTERLEAVED: usize = 4;
 
 /// A ray under way.
 struct Slot<'a, L: Lanes> {
@@ -59,9 +60,14 @@ pub trait Query {
     fn done(&mut self, i: usize, nearest: &Nearest);
 }
 
-/// Follows the rays that are `which`. `TOP`: there are specials.
+/// Follows the rays that are `which`, `SLOTS` at a time. `TOP`: there are specials.
 #[inline(always)]
-pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch, which: impl Which, query: &mut Q) {
+pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
+    bvh: &WideBvh,
+    rays: &RayBatch,
+    which: impl Which,
+    query: &mut Q,
+) {
     if which.len() == 0 {
         return;
     }
@@ -91,7 +97,7 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool>(bvh: &WideBvh, rays: &RayBatch
         let mut k = 0;
         while k < count {
             let slot = &mut slots[live[k] % SLOTS];
-            if advance::<L, Q, TOP>(bvh, rays, slot) {
+            if advance::<L, Q, TOP, SLOTS>(bvh, rays, slot) {
                 k += 1;
                 continue;
             }
@@ -129,9 +135,13 @@ fn fill<'a, L: Lanes, W: Which>(
     false
 }
 
-/// Goes on with a ray until it is done (false) or asks for memory that may be far (true).
+/// Goes on with a ray until it is done (false) or asks for memory that may be far (true; never if it is alone).
 #[inline(always)]
-fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &RayBatch, slot: &mut Slot<'a, L>) -> bool {
+fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
+    bvh: &'a WideBvh,
+    rays: &RayBatch,
+    slot: &mut Slot<'a, L>,
+) -> bool {
     let ids = L::U::load(&[0, 1, 2, 3, 4, 5, 6, 7], 0);
     let by_4 = L::U::load(&[4, 5, 6, 7, 0, 1, 2, 3], 0);
     let by_2 = L::U::load(&[2, 3, 0, 1, 6, 7, 4, 5], 0);
@@ -198,7 +208,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool>(bvh: &'a WideBvh, rays: &Ray
                 }
             },
         };
-        if child.is_far() {
+        if SLOTS > 1 && child.is_far() {
             prefetch(nodes, child.node(), 4);
             (slot.child, slot.len, slot.end) = (child, len, end);
             return true;
