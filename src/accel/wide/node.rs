@@ -68,6 +68,15 @@ impl Node {
         self.children[i] = child.bits();
     }
 
+    /// Low and high corner of all boxes.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        let row = |row: usize| &self.planes[row * WIDTH..][..self.count()];
+        [
+            [0, 1, 2].map(|axis| row(axis).iter().copied().fold(f32::INFINITY, f32::min)),
+            [3, 4, 5].map(|axis| row(axis).iter().copied().fold(f32::NEG_INFINITY, f32::max)),
+        ]
+    }
+
     /// Lanes in use.
     #[inline(always)]
     pub fn count(&self) -> usize {

@@ -1,55 +1,117 @@
 //! A batch's way through packets and single rays.
 
-use super::WideBvh;
 use super::feed::Which;
 use super::leaf::Nearest;
 use super::node::WIDTH;
 use super::packet::{IntersectPackets, OccludedPackets};
 use super::sort::{IsMixed, Sort, Sorted};
+use super::ray::{RayLanes, box_ends};
 use super::traverse::{INTERLEAVED, Query, trace};
+use super::{Space, WideBvh};
 use crate::accel::{HitBatch, MISS, RayBatch};
-use simd::{Kernel, Lanes, dispatch};
+use simd::{Float, Kernel, Lanes, Mask, dispatch};
 use std::ops::Range;
 
 /// Nearest hits of `rays[range]`.
 pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-    if coherent && !bvh.has_specials() {
+    let Some(others) = &bvh.others else { return intersect_at_rest(bvh, rays, range, coherent, hits) };
+    if bvh.world.is_empty() {
+        return run(bvh, others, rays, range, &mut Closest(hits));
+    }
+    intersect_at_rest(bvh, rays, range.clone(), coherent, hits);
+    let mut reaching = Vec::new();
+    let ends = &hits.t;
+    dispatch(bvh.packet_level, Reaching { others, rays, range, ends, occluded: None, reaching: &mut reaching });
+    run(bvh, others, rays, &reaching[..], &mut Closer(hits));
+}
+
+/// Nearest hits with the world's triangles at rest.
+fn intersect_at_rest(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
+    if coherent {
         let mut left = Vec::new();
         dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range, hits: &mut *hits, left: &mut left });
-        run(bvh, rays, &left[..], &mut Closest(hits));
+        run(bvh, &bvh.world, rays, &left[..], &mut Closest(hits));
     } else {
-        run(bvh, rays, range, &mut Closest(hits));
+        run(bvh, &bvh.world, rays, range, &mut Closest(hits));
     }
 }
 
 /// Whether anything is hit by `rays[..n]`.
 pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-    if bvh.has_specials() {
-        run(bvh, rays, 0..n, &mut Any(occluded));
-    } else {
-        let scene = &bvh.world.tree.bounds;
-        if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
-            return occluded_in_packets(bvh, rays, n, occluded);
-        }
-        let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n });
-        let mut found = vec![0; n];
-        occluded_in_packets(bvh, &rays, n, &mut found);
-        from.iter().zip(found).for_each(|(&i, o)| occluded[i as usize] = o);
+    let Some(others) = &bvh.others else { return occluded_at_rest(bvh, rays, n, occluded) };
+    if bvh.world.is_empty() {
+        return run(bvh, others, rays, 0..n, &mut Any(occluded));
     }
+    occluded_at_rest(bvh, rays, n, occluded);
+    let mut reaching = Vec::new();
+    let (range, ends) = (0..n, &rays.t_max);
+    let open = Some(&*occluded);
+    dispatch(bvh.packet_level, Reaching { others, rays, range, ends, occluded: open, reaching: &mut reaching });
+    run(bvh, others, rays, &reaching[..], &mut Any(occluded));
+}
+
+/// Whether any of the world's triangles at rest is hit.
+fn occluded_at_rest(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
+    let scene = &bvh.world.tree.bounds;
+    if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
+        return occluded_in_packets(bvh, rays, n, occluded);
+    }
+    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n });
+    let mut found = vec![0; n];
+    occluded_in_packets(bvh, &rays, n, &mut found);
+    from.iter().zip(found).for_each(|(&i, o)| occluded[i as usize] = o);
 }
 
 fn occluded_in_packets(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     let mut left = Vec::new();
     dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, occluded: &mut *occluded, left: &mut left });
-    run(bvh, rays, &left[..], &mut Any(occluded));
+    run(bvh, &bvh.world, rays, &left[..], &mut Any(occluded));
 }
 
-fn run(bvh: &WideBvh, rays: &RayBatch, which: impl Which, query: &mut impl Query) {
-    dispatch(bvh.level, Singles { bvh, rays, which, query });
+/// Which of `rays[range]` enter the box around `others` before `ends`, of those that nothing stopped so far.
+struct Reaching<'a> {
+    others: &'a Space,
+    rays: &'a RayBatch,
+    range: Range<usize>,
+    ends: &'a [f32],
+    occluded: Option<&'a [u8]>,
+    reaching: &'a mut Vec<u32>,
+}
+
+impl Kernel for Reaching<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { others, rays, range, ends, occluded, reaching } = self;
+        let bounds = others.tree.nodes[others.root.node()].bounds();
+        for at in range.clone().step_by(L::N) {
+            let n = L::N.min(range.end - at);
+            // A range may start anywhere, so its last vector may stick out of the batch: all of it may reach.
+            let mut bits = L::M::first(n).bits();
+            if at + L::N <= rays.capacity() {
+                let packet = RayLanes::<L>::new(rays, at, &others.tree.bounds);
+                bits &= packet.valid & packet.enter(&bounds, box_ends::<L>(L::F::load(ends, at)));
+            }
+            while bits != 0 {
+                let i = at + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                if occluded.is_none_or(|occluded| occluded[i] == 0) {
+                    reaching.push(i as u32);
+                }
+            }
+        }
+    }
+}
+
+/// Sends single rays through `world`, one of the two.
+fn run(bvh: &WideBvh, world: &Space, rays: &RayBatch, which: impl Which, query: &mut impl Query) {
+    dispatch(bvh.level, Singles { bvh, world, rays, which, query });
 }
 
 struct Singles<'a, W, Q> {
     bvh: &'a WideBvh,
+    world: &'a Space,
     rays: &'a RayBatch,
     which: W,
     query: &'a mut Q,
@@ -61,13 +123,13 @@ impl<W: Which, Q: Query> Kernel for Singles<'_, W, Q> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         assert!(L::N == WIDTH, "8 children, 8 lanes");
-        let Self { bvh, rays, which, query } = self;
-        if bvh.has_specials() {
-            trace::<L, Q, true, INTERLEAVED>(bvh, rays, which, query);
+        let Self { bvh, world, rays, which, query } = self;
+        if !world.specials.is_empty() {
+            trace::<L, Q, true, INTERLEAVED>(bvh, world, rays, which, query);
         } else if bvh.interleaves {
-            trace::<L, Q, false, INTERLEAVED>(bvh, rays, which, query);
+            trace::<L, Q, false, INTERLEAVED>(bvh, world, rays, which, query);
         } else {
-            trace::<L, Q, false, 1>(bvh, rays, which, query);
+            trace::<L, Q, false, 1>(bvh, world, rays, which, query);
         }
     }
 }
@@ -79,10 +141,34 @@ impl Query for Closest<'_> {
     const ANY: bool = false;
 
     #[inline(always)]
+    fn before(&self, _: usize, t_max: f32) -> Nearest {
+        Nearest::none(t_max)
+    }
+
+    #[inline(always)]
     fn done(&mut self, i: usize, nearest: &Nearest) {
         let Self(hits) = self;
         (hits.t[i], hits.u[i], hits.v[i]) = (nearest.t, nearest.u, nearest.v);
         (hits.instance[i], hits.primitive[i]) = (nearest.instance, nearest.primitive);
+    }
+}
+
+/// Looks for hits nearer than those found already.
+struct Closer<'a>(&'a mut HitBatch);
+
+impl Query for Closer<'_> {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    fn before(&self, i: usize, _: f32) -> Nearest {
+        let Self(hits) = self;
+        let (instance, primitive) = (hits.instance[i], hits.primitive[i]);
+        Nearest { t: hits.t[i], u: hits.u[i], v: hits.v[i], instance, primitive }
+    }
+
+    #[inline(always)]
+    fn done(&mut self, i: usize, nearest: &Nearest) {
+        Closest(self.0).done(i, nearest);
     }
 }
 
@@ -91,6 +177,11 @@ struct Any<'a>(&'a mut [u8]);
 
 impl Query for Any<'_> {
     const ANY: bool = true;
+
+    #[inline(always)]
+    fn before(&self, _: usize, t_max: f32) -> Nearest {
+        Nearest::none(t_max)
+    }
 
     #[inline(always)]
     fn done(&mut self, i: usize, nearest: &Nearest) {

@@ -160,6 +160,21 @@ impl<L: Lanes> RayLanes<L> {
         (enter.le(exit).bits(), enter)
     }
 
+    /// Those that enter the box of corners `low` and `high` in [0, `end`], whatever their shapes, as bits. As
+    /// [`RayLanes::test_box`].
+    #[inline(always)]
+    pub fn enter(&self, [low, high]: &[[f32; 3]; 2], end: L::F) -> u32 {
+        let (mut enter, mut exit) = (L::F::zero(), end);
+        for axis in 0..3 {
+            let down = L::M::from_bits(self.down[axis]);
+            let (low, high) = (L::F::splat(low[axis]), L::F::splat(high[axis]));
+            let (near, far) = swap::<L>(down, low, high);
+            enter = near.mul_add(self.near_inverse[axis], self.near_start[axis]).max(enter);
+            exit = far.mul_add(self.far_inverse[axis], self.far_start[axis]).min(exit);
+        }
+        enter.le(exit).bits()
+    }
+
     /// The numbers of all rays, to take single rays from.
     #[inline(always)]
     pub fn store(&self, out: &mut [[f32; WIDTH]; 18]) {

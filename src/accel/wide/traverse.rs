@@ -56,14 +56,17 @@ struct Slot<'a, L: Lanes> {
 pub trait Query {
     /// Whether any hit will do.
     const ANY: bool;
+    /// What ray `i`, which ends at `t_max`, has hit already.
+    fn before(&self, i: usize, t_max: f32) -> Nearest;
     /// What was found for ray `i`.
     fn done(&mut self, i: usize, nearest: &Nearest);
 }
 
-/// Follows the rays that are `which`, `SLOTS` at a time. `TOP`: there are specials.
+/// Follows the rays that are `which` through `world`, `SLOTS` at a time. `TOP`: there are specials.
 #[inline(always)]
 pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
     bvh: &WideBvh,
+    world: &Space,
     rays: &RayBatch,
     which: impl Which,
     query: &mut Q,
@@ -71,10 +74,10 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
     if which.len() == 0 {
         return;
     }
-    let mut feed = Feed::<L, _>::new(which, rays, &bvh.world.tree.bounds);
+    let mut feed = Feed::<L, _>::new(which, rays, &world.tree.bounds);
     let (nowhere, _) = single::<L>(Vec3::ZERO, Vec3::Z, &[[0.0; 3]; 2]).expect("a ray");
     let mut slots: [Slot<'_, L>; SLOTS] = std::array::from_fn(|_| Slot {
-        space: &bvh.world,
+        space: world,
         ray: nowhere,
         octant: 0,
         i: 0,
@@ -90,19 +93,19 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
     });
     let mut live: [usize; SLOTS] = std::array::from_fn(|k| k);
     let mut count = 0;
-    while count < SLOTS && fill(&bvh.world, &mut feed, rays, &mut slots[live[count]], query) {
+    while count < SLOTS && fill(world, &mut feed, rays, &mut slots[live[count]], query) {
         count += 1;
     }
     while count > 0 {
         let mut k = 0;
         while k < count {
             let slot = &mut slots[live[k] % SLOTS];
-            if advance::<L, Q, TOP, SLOTS>(bvh, rays, slot) {
+            if advance::<L, Q, TOP, SLOTS>(bvh, world, rays, slot) {
                 k += 1;
                 continue;
             }
             query.done(slot.i, &slot.nearest);
-            if fill(&bvh.world, &mut feed, rays, slot, query) {
+            if fill(world, &mut feed, rays, slot, query) {
                 k += 1;
             } else {
                 count -= 1;
@@ -122,7 +125,7 @@ fn fill<'a, L: Lanes, W: Which>(
     query: &mut impl Query,
 ) -> bool {
     while let Some((i, ray)) = feed.next() {
-        let nearest = Nearest::none(rays.t_max[i]);
+        let nearest = query.before(i, rays.t_max[i]);
         let Some((ray, octant)) = ray else {
             query.done(i, &nearest);
             continue;
@@ -139,6 +142,7 @@ fn fill<'a, L: Lanes, W: Which>(
 #[inline(always)]
 fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
     bvh: &'a WideBvh,
+    world: &'a Space,
     rays: &RayBatch,
     slot: &mut Slot<'a, L>,
 ) -> bool {
@@ -195,7 +199,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
             None => loop {
                 if len == slot.base {
                     if TOP && len > 0 {
-                        leave(bvh, slot);
+                        leave(world, slot);
                         (nodes, leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
                         continue;
                     }
@@ -269,7 +273,7 @@ fn current_ray<L: Lanes>(bvh: &WideBvh, rays: &RayBatch, slot: &Slot<'_, L>) -> 
 
 /// Back to the world.
 #[inline(always)]
-fn leave<'a, L: Lanes>(bvh: &'a WideBvh, slot: &mut Slot<'a, L>) {
+fn leave<'a, L: Lanes>(world: &'a Space, slot: &mut Slot<'a, L>) {
     (slot.ray, slot.octant) = slot.outer;
-    (slot.space, slot.base, slot.asked.instance) = (&bvh.world, 0, 0);
+    (slot.space, slot.base, slot.asked.instance) = (world, 0, 0);
 }
