@@ -97,6 +97,7 @@ fn counts(part: &Part, i: usize) -> bool {
 }
 
 /// `ray` in the space of an object; t stays what it is.
+#[inline(always)]
 pub(super) fn ray_in_object(object_from_world: &Affine, ray: &ShapeRay) -> ShapeRay {
     ShapeRay { origin: object_from_world.point(ray.origin), direction: object_from_world.vector(ray.direction), ..*ray }
 }

@@ -72,9 +72,10 @@ fn gathered<L: Lanes>(rays: &RayBatch, which: [usize; WIDTH], scene: &[[f32; 3];
     RayLanes::of(o, d, L::F::load(&numbers[6], 0), scene)
 }
 
-/// One ray in a space of its own, in every lane; `None` if it is none there.
+/// Makes `ray` the one in a space of its own, in every lane, and tells where its octant begins in the nodes' orders;
+/// `None` if it is none there. Written in place: handing such a ray on takes as long as making it.
 #[inline(always)]
-pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) -> Option<Ready<L>> {
+pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2], ray: &mut SingleRay<L>) -> Option<u32> {
     let o = [L::F::splat(origin.x), L::F::splat(origin.y), L::F::splat(origin.z)];
     let d = [L::F::splat(direction.x), L::F::splat(direction.y), L::F::splat(direction.z)];
     let lanes = RayLanes::<L>::of(o, d, L::F::splat(f32::INFINITY), scene);
@@ -82,7 +83,8 @@ pub fn single<L: Lanes>(origin: Vec3, direction: Vec3, scene: &[[f32; 3]; 2]) ->
         return None;
     }
     let shape = lanes.shape(0);
-    Some((SingleRay::of_lanes(&lanes, shape), shape.octant()))
+    ray.set(&lanes, shape);
+    Some(shape.octant())
 }
 
 /// A ray and where its octant begins in the nodes' orders.

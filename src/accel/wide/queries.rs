@@ -4,8 +4,8 @@ use super::feed::Which;
 use super::leaf::Nearest;
 use super::node::WIDTH;
 use super::packet::{IntersectPackets, OccludedPackets};
-use super::sort::{IsMixed, Sort, Sorted};
 use super::ray::{RayLanes, box_ends};
+use super::sort::{IsMixed, Sort, Sorted};
 use super::traverse::{INTERLEAVED, Query, trace};
 use super::{Space, WideBvh};
 use crate::accel::{HitBatch, MISS, RayBatch};
@@ -14,44 +14,35 @@ use std::ops::Range;
 
 /// Nearest hits of `rays[range]`.
 pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-    let Some(others) = &bvh.others else { return intersect_at_rest(bvh, rays, range, coherent, hits) };
-    if bvh.world.is_empty() {
+    if let Some(others) = &bvh.others
+        && bvh.world.is_empty()
+        && !coherent
+    {
         return run(bvh, others, rays, range, &mut Closest(hits));
     }
-    intersect_at_rest(bvh, rays, range.clone(), coherent, hits);
-    let mut reaching = Vec::new();
-    let ends = &hits.t;
-    dispatch(bvh.packet_level, Reaching { others, rays, range, ends, occluded: None, reaching: &mut reaching });
-    run(bvh, others, rays, &reaching[..], &mut Closer(hits));
-}
-
-/// Nearest hits with the world's triangles at rest.
-fn intersect_at_rest(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
+    let mut left = Vec::new();
+    let packets = |others, hits: &mut HitBatch, left: &mut Vec<u32>| {
+        left.clear();
+        dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range: range.clone(), others, hits, left });
+    };
     if coherent {
-        let mut left = Vec::new();
-        dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range, hits: &mut *hits, left: &mut left });
-        run(bvh, &bvh.world, rays, &left[..], &mut Closest(hits));
+        packets(false, &mut *hits, &mut left);
+        run(bvh, &bvh.world, rays, &left[..], &mut Closest(&mut *hits));
     } else {
-        run(bvh, &bvh.world, rays, range, &mut Closest(hits));
+        run(bvh, &bvh.world, rays, range.clone(), &mut Closest(&mut *hits));
     }
+    let Some(others) = &bvh.others else { return };
+    if coherent {
+        packets(true, &mut *hits, &mut left);
+    } else {
+        let (ends, range, left) = (&hits.t, range.clone(), &mut left);
+        dispatch(bvh.packet_level, Reaching { others, rays, range, ends, left });
+    }
+    run(bvh, others, rays, &left[..], &mut Closer(hits));
 }
 
 /// Whether anything is hit by `rays[..n]`.
 pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-    let Some(others) = &bvh.others else { return occluded_at_rest(bvh, rays, n, occluded) };
-    if bvh.world.is_empty() {
-        return run(bvh, others, rays, 0..n, &mut Any(occluded));
-    }
-    occluded_at_rest(bvh, rays, n, occluded);
-    let mut reaching = Vec::new();
-    let (range, ends) = (0..n, &rays.t_max);
-    let open = Some(&*occluded);
-    dispatch(bvh.packet_level, Reaching { others, rays, range, ends, occluded: open, reaching: &mut reaching });
-    run(bvh, others, rays, &reaching[..], &mut Any(occluded));
-}
-
-/// Whether any of the world's triangles at rest is hit.
-fn occluded_at_rest(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     let scene = &bvh.world.tree.bounds;
     if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
         return occluded_in_packets(bvh, rays, n, occluded);
@@ -64,18 +55,25 @@ fn occluded_at_rest(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8
 
 fn occluded_in_packets(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     let mut left = Vec::new();
-    dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, occluded: &mut *occluded, left: &mut left });
-    run(bvh, &bvh.world, rays, &left[..], &mut Any(occluded));
+    let mut through = |world: &Space, others: bool| {
+        left.clear();
+        let (occluded, left) = (&mut *occluded, &mut left);
+        dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, others, occluded, left });
+        run(bvh, world, rays, &left[..], &mut Any(occluded));
+    };
+    through(&bvh.world, false);
+    if let Some(others) = &bvh.others {
+        through(others, true);
+    }
 }
 
-/// Which of `rays[range]` enter the box around `others` before `ends`, of those that nothing stopped so far.
+/// Which of `rays[range]` enter the box around `others` before `ends`.
 struct Reaching<'a> {
     others: &'a Space,
     rays: &'a RayBatch,
     range: Range<usize>,
     ends: &'a [f32],
-    occluded: Option<&'a [u8]>,
-    reaching: &'a mut Vec<u32>,
+    left: &'a mut Vec<u32>,
 }
 
 impl Kernel for Reaching<'_> {
@@ -83,7 +81,7 @@ impl Kernel for Reaching<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { others, rays, range, ends, occluded, reaching } = self;
+        let Self { others, rays, range, ends, left } = self;
         let bounds = others.tree.nodes[others.root.node()].bounds();
         for at in range.clone().step_by(L::N) {
             let n = L::N.min(range.end - at);
@@ -94,11 +92,8 @@ impl Kernel for Reaching<'_> {
                 bits &= packet.valid & packet.enter(&bounds, box_ends::<L>(L::F::load(ends, at)));
             }
             while bits != 0 {
-                let i = at + bits.trailing_zeros() as usize;
+                left.push(at as u32 + bits.trailing_zeros());
                 bits &= bits - 1;
-                if occluded.is_none_or(|occluded| occluded[i] == 0) {
-                    reaching.push(i as u32);
-                }
             }
         }
     }

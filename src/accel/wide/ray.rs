@@ -260,16 +260,32 @@ impl<L: Lanes> SingleRay<L> {
         }
     }
 
-    /// The ray that all lanes of `lanes` are.
+    /// No ray.
     #[inline(always)]
-    pub fn of_lanes(lanes: &RayLanes<L>, shape: Shape) -> Self {
-        let (mut near_rows, mut far_rows) = ([0; 3], [0; 3]);
-        for axis in 0..3 {
-            (near_rows[axis], far_rows[axis]) = rows(axis, shape.down[axis]);
+    pub fn none() -> Self {
+        let zero = [L::F::zero(); 3];
+        Self {
+            near_rows: [0; 3],
+            far_rows: [0; 3],
+            near_inverse: zero,
+            near_start: zero,
+            far_inverse: zero,
+            far_start: zero,
+            axes: [0; 3],
+            origin: zero,
+            shear: zero,
         }
-        let RayLanes { near_inverse, near_start, far_inverse, far_start, origin, shear, .. } = *lanes;
-        let axes = shape.axes;
-        Self { near_rows, far_rows, near_inverse, near_start, far_inverse, far_start, axes, origin, shear }
+    }
+
+    /// Makes it the ray that all lanes of `lanes` are.
+    #[inline(always)]
+    pub fn set(&mut self, lanes: &RayLanes<L>, shape: Shape) {
+        for axis in 0..3 {
+            (self.near_rows[axis], self.far_rows[axis]) = rows(axis, shape.down[axis]);
+        }
+        (self.near_inverse, self.near_start) = (lanes.near_inverse, lanes.near_start);
+        (self.far_inverse, self.far_start) = (lanes.far_inverse, lanes.far_start);
+        (self.axes, self.origin, self.shear) = (shape.axes, lanes.origin, lanes.shear);
     }
 
     /// Which of a node's boxes the ray meets in [0, `end`], and where it enters them. As [`RayLanes::test_box`].

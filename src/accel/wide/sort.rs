@@ -91,6 +91,7 @@ impl Kernel for Sort<'_> {
             i.gather(&rays.dy).store(&mut sorted.dy, at);
             i.gather(&rays.dz).store(&mut sorted.dz, at);
             i.gather(&rays.t_max).store(&mut sorted.t_max, at);
+            i.gather(&rays.time).store(&mut sorted.time, at);
             i.gather_uint(&rays.key).store(&mut sorted.key, at);
         }
         Sorted { rays: sorted, from }

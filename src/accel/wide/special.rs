@@ -33,6 +33,12 @@ impl Placed {
         Self { object: placement.object, object_from_world, keys }
     }
 
+    /// The map of what stands still.
+    #[inline(always)]
+    pub fn at_rest(&self) -> Option<&Affine> {
+        self.keys.is_empty().then_some(&self.object_from_world)
+    }
+
     /// The map at `time`; `None` if it has none then.
     #[inline(always)]
     pub fn object_from_world(&self, time: f32) -> Option<Affine> {

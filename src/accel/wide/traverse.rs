@@ -12,7 +12,7 @@
 //! terrain, 0.9 elsewhere. Asking for what is on top of the stack as well: 0.95 to 0.98. Compressions and masks of
 //! AVX-512 in 8 lanes in place of AVX2: 0.96 to 0.99. Nothing but what changes is read through the slot: 1.03.
 
-use super::feed::{Feed, Ready, Which, single};
+use super::feed::{Feed, Which, single};
 use super::leaf::{self, Asked, Nearest};
 use super::node::{Child, WIDTH};
 use super::ray::{SingleRay, box_end};
@@ -31,9 +31,10 @@ pub const INTERLEAVED: usize = 4;
 struct Slot<'a, L: Lanes> {
     /// Where it is: the world, or a placed object.
     space: &'a Space,
-    ray: SingleRay<L>,
-    /// Where the ray's octant begins in the nodes' orders.
-    octant: u32,
+    /// In the world and, while it is in a placed object, there.
+    ray: [SingleRay<L>; 2],
+    /// Where the octants of both begin in the nodes' orders.
+    octant: [u32; 2],
     /// Which ray of the batch it is.
     i: usize,
     asked: Asked<'a>,
@@ -48,8 +49,14 @@ struct Slot<'a, L: Lanes> {
     base: usize,
     enter: [f32; STACK + WIDTH],
     children: [u32; STACK + WIDTH],
-    /// The ray in the world and its octant, while it is in a placed object.
-    outer: Ready<L>,
+}
+
+impl<L: Lanes> Slot<'_, L> {
+    /// Which of both rays it is now.
+    #[inline(always)]
+    fn inside(&self) -> usize {
+        usize::from(self.asked.instance > 0)
+    }
 }
 
 /// What is asked about rays.
@@ -75,11 +82,10 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
         return;
     }
     let mut feed = Feed::<L, _>::new(which, rays, &world.tree.bounds);
-    let (nowhere, _) = single::<L>(Vec3::ZERO, Vec3::Z, &[[0.0; 3]; 2]).expect("a ray");
     let mut slots: [Slot<'_, L>; SLOTS] = std::array::from_fn(|_| Slot {
         space: world,
-        ray: nowhere,
-        octant: 0,
+        ray: [SingleRay::none(); 2],
+        octant: [0; 2],
         i: 0,
         asked: Asked { filter: bvh.filter.as_deref(), key: 0, instance: 0 },
         end: 0.0,
@@ -89,7 +95,6 @@ pub fn trace<L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
         base: 0,
         enter: [0.0; STACK + WIDTH],
         children: [0; STACK + WIDTH],
-        outer: (nowhere, 0),
     });
     let mut live: [usize; SLOTS] = std::array::from_fn(|k| k);
     let mut count = 0;
@@ -130,7 +135,7 @@ fn fill<'a, L: Lanes, W: Which>(
             query.done(i, &nearest);
             continue;
         };
-        (slot.ray, slot.octant, slot.i, slot.end, slot.nearest) = (ray, octant, i, box_end(nearest.t), nearest);
+        (slot.ray[0], slot.octant[0], slot.i, slot.end, slot.nearest) = (ray, octant, i, box_end(nearest.t), nearest);
         (slot.space, slot.child, slot.len, slot.base) = (world, world.root, 0, 0);
         (slot.asked.key, slot.asked.instance) = (rays.key[i], 0);
         return true;
@@ -154,15 +159,16 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
     let (mut child, mut len, mut end) = (slot.child, slot.len, slot.end);
     // Not read through the slot at every step: it changes all the time.
     let (mut nodes, mut leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
+    let mut inside = if TOP { slot.inside() } else { 0 };
     loop {
         let mut next = None;
         if child.is_leaf() {
             if Q::ANY {
-                if leaf::occluded(leaves, child, &slot.ray, &slot.asked, slot.nearest.t) {
+                if leaf::occluded(leaves, child, &slot.ray[inside], &slot.asked, slot.nearest.t) {
                     slot.nearest.primitive = 0;
                     return false;
                 }
-            } else if leaf::intersect(leaves, child, &slot.ray, &slot.asked, &mut slot.nearest) {
+            } else if leaf::intersect(leaves, child, &slot.ray[inside], &slot.asked, &mut slot.nearest) {
                 end = box_end(slot.nearest.t);
             }
         } else if TOP && child.is_special() {
@@ -173,10 +179,11 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
             }
             end = box_end(slot.nearest.t);
             (nodes, leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
+            inside = slot.inside();
             next = found;
         } else {
             let node = &nodes[child.node()];
-            let (hit, enter) = slot.ray.test_boxes(&node.planes, L::F::splat(end));
+            let (hit, enter) = slot.ray[inside].test_boxes(&node.planes, L::F::splat(end));
             let at = len % STACK;
             // Where boxes are entered, unique by the lane's number in the lowest bits: off by 7 ulp at most.
             let key = ((enter.to_bits() & L::U::splat(!7)) | ids).to_float_bits().or_else(hit, none);
@@ -185,7 +192,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
             let least = least.min(least.permute(by_1));
             let first = least.first();
             if first < f32::INFINITY {
-                let order = L::U::load(&node.order, 0).shr(slot.octant);
+                let order = L::U::load(&node.order, 0).shr(slot.octant[inside]);
                 let key = key.permute(order);
                 let keep = least.lt(key) & key.lt(none);
                 L::U::load(&node.children, 0).permute(order).compress(keep, &mut slot.children, at);
@@ -201,6 +208,7 @@ fn advance<'a, L: Lanes, Q: Query, const TOP: bool, const SLOTS: usize>(
                     if TOP && len > 0 {
                         leave(world, slot);
                         (nodes, leaves) = (&slot.space.tree.nodes[..], &slot.space.tree.leaves);
+                        inside = 0;
                         continue;
                     }
                     return false;
@@ -236,9 +244,8 @@ fn special<'a, L: Lanes, Q: Query>(
             let placed = &bvh.placed[p as usize];
             let ray = ray_in_object(&placed.object_from_world(ray.time)?, &ray);
             let space = &bvh.objects[placed.object as usize];
-            let (inside, octant) = single::<L>(ray.origin, ray.direction, &space.tree.bounds)?;
-            slot.outer = (slot.ray, slot.octant);
-            (slot.ray, slot.octant, slot.space, slot.base) = (inside, octant, space, slot.len);
+            slot.octant[1] = single::<L>(ray.origin, ray.direction, &space.tree.bounds, &mut slot.ray[1])?;
+            (slot.space, slot.base) = (space, slot.len);
             slot.asked.instance = p + 1;
             Some(space.root)
         }
@@ -274,6 +281,5 @@ fn current_ray<L: Lanes>(bvh: &WideBvh, rays: &RayBatch, slot: &Slot<'_, L>) -> 
 /// Back to the world.
 #[inline(always)]
 fn leave<'a, L: Lanes>(world: &'a Space, slot: &mut Slot<'a, L>) {
-    (slot.ray, slot.octant) = slot.outer;
     (slot.space, slot.base, slot.asked.instance) = (world, 0, 0);
 }
