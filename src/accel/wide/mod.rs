@@ -3,11 +3,11 @@
 //! Triangles at rest: `build` makes a binary SAH tree of `reference`s of a `source`, divided where `bins` says, after
 //! `split` has cut those that waste their boxes into parts, if that pays (`clip` is the geometry of that); `collapse`
 //! merges it to nodes of up to 8 children and leaves of up to 8 triangles (`node` is the memory layout). Whatever else
-//! there is - placed objects, exact shapes (`special`), `moving` triangles - is a box of a second tree, whose nodes lie
-//! behind those of the first and lead to it.
+//! there is - placed objects, exact shapes (`special`), `moving` triangles - is a box of a second tree; in a placed object
+//! its nodes lie behind those of the first and lead to it.
 //!
 //! `queries` sends a batch through `packet`s, as far as its rays belong together, and the others one by one through
-//! `traverse`, which `feed` gives them to. `ray` tests boxes, `leaf` triangles.
+//! `traverse`, which `feed` gives them to: first through the world's triangles at rest, then through the rest. `ray` tests boxes, `leaf` triangles.
 
 mod bins;
 mod build;
