@@ -86,4 +86,10 @@ impl HitBatch {
             instance: Buffer::new(n),
         }
     }
+
+    /// Makes hit `i` what hit `k` of `other` is.
+    pub fn copy(&mut self, i: usize, other: &Self, k: usize) {
+        (self.t[i], self.u[i], self.v[i]) = (other.t[k], other.u[k], other.v[k]);
+        (self.primitive[i], self.instance[i]) = (other.primitive[k], other.instance[k]);
+    }
 }

@@ -12,20 +12,20 @@ use crate::accel::{HitBatch, MISS, RayBatch};
 use simd::{Float, Kernel, Lanes, Mask, dispatch};
 use std::ops::Range;
 
+/// Scattered rays that reach what is not at rest, from which on they are put in order and go in packets.
+const MANY: usize = 512;
+
 /// Nearest hits of `rays[range]`.
 pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
-    if let Some(others) = &bvh.others
-        && bvh.world.is_empty()
-        && !coherent
-    {
-        return run(bvh, others, rays, range, &mut Closest(hits));
-    }
     let mut left = Vec::new();
     let packets = |others, hits: &mut HitBatch, left: &mut Vec<u32>| {
         left.clear();
         dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range: range.clone(), others, hits, left });
     };
-    if coherent {
+    if bvh.world.is_empty() {
+        hits.t[range.clone()].copy_from_slice(&rays.t_max[range.clone()]);
+        hits.primitive[range.clone()].fill(MISS);
+    } else if coherent {
         packets(false, &mut *hits, &mut left);
         run(bvh, &bvh.world, rays, &left[..], &mut Closest(&mut *hits));
     } else {
@@ -34,11 +34,28 @@ pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: 
     let Some(others) = &bvh.others else { return };
     if coherent {
         packets(true, &mut *hits, &mut left);
-    } else {
-        let (ends, range, left) = (&hits.t, range.clone(), &mut left);
-        dispatch(bvh.packet_level, Reaching { others, rays, range, ends, left });
+        return run(bvh, others, rays, &left[..], &mut Closer(hits));
     }
-    run(bvh, others, rays, &left[..], &mut Closer(hits));
+    left.clear();
+    let (ends, reaching) = (&hits.t, &mut left);
+    dispatch(bvh.packet_level, Reaching { others, rays, range: range.clone(), ends, reaching });
+    if left.len() < MANY {
+        return run(bvh, others, rays, &left[..], &mut Closer(hits));
+    }
+    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, which: &left });
+    let n = left.len();
+    let mut found = HitBatch::new(n);
+    for (k, &i) in from[..n].iter().enumerate() {
+        found.copy(k, hits, i as usize);
+    }
+    left.clear();
+    let (hits_of_sorted, range) = (&mut found, 0..n);
+    let packets = IntersectPackets { bvh, rays: &rays, range, others: true, hits: hits_of_sorted, left: &mut left };
+    dispatch(bvh.packet_level, packets);
+    run(bvh, others, &rays, &left[..], &mut Closer(&mut found));
+    for (k, &i) in from[..n].iter().enumerate() {
+        hits.copy(i as usize, &found, k);
+    }
 }
 
 /// Whether anything is hit by `rays[..n]`.
@@ -47,7 +64,8 @@ pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
         return occluded_in_packets(bvh, rays, n, occluded);
     }
-    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n });
+    let all: Vec<u32> = (0..n as u32).collect();
+    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, which: &all });
     let mut found = vec![0; n];
     occluded_in_packets(bvh, &rays, n, &mut found);
     from.iter().zip(found).for_each(|(&i, o)| occluded[i as usize] = o);
@@ -73,7 +91,7 @@ struct Reaching<'a> {
     rays: &'a RayBatch,
     range: Range<usize>,
     ends: &'a [f32],
-    left: &'a mut Vec<u32>,
+    reaching: &'a mut Vec<u32>,
 }
 
 impl Kernel for Reaching<'_> {
@@ -81,7 +99,7 @@ impl Kernel for Reaching<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { others, rays, range, ends, left } = self;
+        let Self { others, rays, range, ends, reaching } = self;
         let bounds = others.tree.nodes[others.root.node()].bounds();
         for at in range.clone().step_by(L::N) {
             let n = L::N.min(range.end - at);
@@ -92,7 +110,7 @@ impl Kernel for Reaching<'_> {
                 bits &= packet.valid & packet.enter(&bounds, box_ends::<L>(L::F::load(ends, at)));
             }
             while bits != 0 {
-                left.push(at as u32 + bits.trailing_zeros());
+                reaching.push(at as u32 + bits.trailing_zeros());
                 bits &= bits - 1;
             }
         }

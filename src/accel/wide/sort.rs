@@ -1,4 +1,4 @@
-//! Shadow rays of a batch put in order, so that alike ones share packets.
+//! Rays of a batch put in order, so that alike ones share packets: shadow rays, and scattered ones among placed objects.
 //!
 //! Where rays go to several lights, 16 neighbours are of many octants and each packet is walked by a few lanes at a time.
 //! Rays of the same octant and largest axis brought together, in their old order, fill it: 1.4 times the speed in a room
@@ -9,6 +9,8 @@ use super::ray::RayLanes;
 use crate::accel::RayBatch;
 use simd::{Buffer, Float, Kernel, Lanes, Uint};
 
+/// Lanes at most.
+const MAX_LANES: usize = 16;
 /// Kinds of rays: octant and largest axis.
 const KINDS: usize = 8 * 4;
 /// One packet of so many is looked at.
@@ -54,10 +56,10 @@ pub struct Sorted {
     pub from: Buffer<u32>,
 }
 
-/// Puts `rays[..n]` in order.
+/// Puts those of `rays` that are `which` in order.
 pub struct Sort<'a> {
     pub rays: &'a RayBatch,
-    pub n: usize,
+    pub which: &'a [u32],
 }
 
 impl Kernel for Sort<'_> {
@@ -65,10 +67,11 @@ impl Kernel for Sort<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Sorted {
-        let Self { rays, n } = self;
+        let Self { rays, which } = self;
+        let n = which.len();
         let mut kinds = Buffer::<u32>::new(n);
         for at in (0..n).step_by(L::N) {
-            kind::<L>(rays, at).store(&mut kinds, at);
+            kind::<L>(rays, which, at).store(&mut kinds, at);
         }
         let mut next = [0; KINDS + 1];
         kinds[..n].iter().for_each(|&k| next[k as usize % KINDS + 1] += 1);
@@ -76,9 +79,9 @@ impl Kernel for Sort<'_> {
             next[k + 1] += next[k];
         }
         let mut from = Buffer::<u32>::new(n);
-        for (i, &k) in kinds[..n].iter().enumerate() {
+        for (&i, &k) in which.iter().zip(&kinds[..n]) {
             let to = &mut next[k as usize % KINDS];
-            from[*to] = i as u32;
+            from[*to] = i;
             *to += 1;
         }
         let mut sorted = RayBatch::new(n);
@@ -100,8 +103,15 @@ impl Kernel for Sort<'_> {
 
 /// Octant and largest axis. What is no ray is of any kind.
 #[inline(always)]
-fn kind<L: Lanes>(rays: &RayBatch, at: usize) -> L::U {
-    let (x, y, z) = (L::F::load(&rays.dx, at), L::F::load(&rays.dy, at), L::F::load(&rays.dz, at));
+fn kind<L: Lanes>(rays: &RayBatch, which: &[u32], at: usize) -> L::U {
+    let i = if at + L::N <= which.len() {
+        L::U::load(which, at)
+    } else {
+        let mut last = [0; MAX_LANES];
+        last[..which.len() - at].copy_from_slice(&which[at..]);
+        L::U::load(&last, 0)
+    };
+    let (x, y, z) = (i.gather(&rays.dx), i.gather(&rays.dy), i.gather(&rays.dz));
     let bit = |v: u32| L::U::splat(v);
     let zero = bit(0);
     let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
@@ -125,7 +135,7 @@ mod tests {
             let d =
                 Vec3::new((h >> 22) as f32 - 511.5, (h >> 12 & 1023) as f32 - 511.5, (h >> 2 & 1023) as f32 - 511.5);
             rays.set(i, Vec3::splat(i as f32), d, 1.0 + i as f32);
-            rays.key[i] = h;
+            (rays.key[i], rays.time[i]) = (h, 1.0 / (i + 1) as f32);
         }
         rays
     }
@@ -133,30 +143,32 @@ mod tests {
     #[test]
     fn alike_rays_come_together_in_their_old_order_and_none_is_lost() {
         let rays = rays(1001);
+        let which: Vec<u32> = (0..1001).filter(|i| i % 7 != 3).collect();
         for level in [Level::Scalar, Level::Portable8, Level::Avx2, Level::Avx512] {
             if !level.is_available() {
                 continue;
             }
-            let Sorted { rays: sorted, from } = dispatch(level, Sort { rays: &rays, n: 1001 });
+            let Sorted { rays: sorted, from } = dispatch(level, Sort { rays: &rays, which: &which });
             let kind = |d: Vec3| {
                 let a = d.abs();
                 let axis = if a.x >= a.y && a.x >= a.z { 1 } else { 2 * u32::from(a.y >= a.z) };
                 d.is_negative_bitmask() | axis << 3
             };
-            let all: Vec<(u32, u32)> = (0..1001)
+            let all: Vec<(u32, u32)> = (0..which.len())
                 .map(|i| {
                     let k = from[i] as usize;
                     let d = Vec3::new(sorted.dx[i], sorted.dy[i], sorted.dz[i]);
                     assert_eq!(d, Vec3::new(rays.dx[k], rays.dy[k], rays.dz[k]));
                     assert_eq!([sorted.ox[i], sorted.oy[i], sorted.oz[i]], [k as f32; 3]);
                     assert_eq!((sorted.t_max[i], sorted.key[i]), (rays.t_max[k], rays.key[k]));
+                    assert_eq!(sorted.time[i], rays.time[k]);
                     (kind(d), from[i])
                 })
                 .collect();
             assert!(all.is_sorted(), "{}", level.name());
             let mut places: Vec<u32> = all.iter().map(|ray| ray.1).collect();
             places.sort_unstable();
-            assert!(places.into_iter().eq(0..1001), "{}", level.name());
+            assert_eq!(places, which, "{}", level.name());
         }
     }
 
