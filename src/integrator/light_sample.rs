@@ -41,7 +41,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
-    let weight = one.or_else(light.is_delta, weight::<L>(light.pdf, value.pdf, !closure.bsdf.is_glossy()));
+    let weight = one.or_else(light.is_hidden, weight::<L>(light.pdf, value.pdf, !closure.bsdf.is_glossy()));
     let mut arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
     let (through, proper) = closure.sides(tables, si, light.wi);
     let sees = scatters & light.valid & proper;

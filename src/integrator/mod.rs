@@ -16,6 +16,7 @@ mod normals;
 mod pool;
 mod receiver;
 mod shade;
+mod sized;
 mod terminator;
 mod through;
 mod wave;

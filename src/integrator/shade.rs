@@ -10,6 +10,7 @@ use super::medium::{Crossing, Stack};
 use super::miss::see_environment;
 use super::pool::PathPool;
 use super::receiver::{self, receiver};
+use super::sized::{see_balls, see_suns};
 use super::wave::Counters;
 use super::weight::remembered;
 use crate::accel::MISS;
@@ -61,6 +62,12 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let mut hit = active & !primitive.eq(L::U::splat(MISS));
     if tables.lights.has_environment() {
         see_environment::<L>(tables, pool, at, slot, active & !hit);
+    }
+    if !tables.lights.balls().is_empty() {
+        see_balls::<L>(tables, pool, at, slot, active, hit);
+    }
+    if !tables.lights.suns().is_empty() {
+        see_suns::<L>(tables, pool, at, slot, active & !hit);
     }
     if tables.media.has_volume() {
         let inside = !Stack::<L>::load(&pool.media, at).innermost().eq(L::U::splat(AIR));

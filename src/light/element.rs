@@ -13,7 +13,7 @@ use simd::{Float, Lanes, Mask, Uint};
 /// |---|---|---|
 /// | 0 | corner, position or direction towards the light | kind |
 /// | 1 | edge 1, or the spot's axis | attributes |
-/// | 2 | edge 2, or the spot's scale and outer cosine | - |
+/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius, or 1 - cos of the sun's | - |
 /// | 3 | intensity or illuminance | material |
 /// | 4 | unit normal | offset length |
 pub const RECORDS: u32 = 5;
@@ -40,14 +40,14 @@ pub struct LampTriangle {
 
 /// A point on a light seen from a shading point.
 pub struct LightSample<L: Lanes> {
-    /// Radiance of an area light, nits; intensity / distance^2 or illuminance of the others, lux.
+    /// Radiance of an area light, nits; of the others what a surface that faces them gets, lux.
     pub radiance: V3<L>,
     /// Unit, towards the light.
     pub wi: V3<L>,
-    /// 1/sr with the selection pmf in it; the pmf alone for delta lights.
+    /// 1/sr with the selection pmf in it; the pmf alone where `is_hidden`.
     pub pdf: L::F,
-    /// Light without size: no BSDF sample can hit it.
-    pub is_delta: L::M,
+    /// Light that is no part of the scene's surfaces and surroundings: no scattered ray finds it.
+    pub is_hidden: L::M,
     /// Where the shadow ray ends, already off the light's surface; the direction itself for directional lights.
     pub end: V3<L>,
     /// Lanes whose light is infinitely far.
@@ -60,7 +60,7 @@ pub struct LightSample<L: Lanes> {
 
 /// Chosen elements: their first four records, and where the fifth is.
 pub struct Element<L: Lanes> {
-    records: [[L::F; 4]; 4],
+    pub(super) records: [[L::F; 4]; 4],
     normal: L::U,
     /// Selection pmf.
     pub pmf: L::F,
@@ -86,11 +86,12 @@ pub fn triangle(lamp: &LampTriangle, material: u32) -> [[f32; 4]; RECORDS as usi
     ]
 }
 
-/// A point light, or a spot light about an axis with the cosines of its inner and outer half angles.
+/// A point light, or a spot light about an axis with the cosines of its inner and outer half angles; a ball of `radius`.
 pub fn point(
     position: glam::Vec3,
     intensity: [f32; 3],
     cone: Option<(glam::Vec3, f32, f32)>,
+    radius: f64,
 ) -> [[f32; 4]; RECORDS as usize] {
     let spot = |(axis, inner, outer): (glam::Vec3, f32, f32)| {
         (axis, spot_scale(f64::from(inner), f64::from(outer)) as f32, outer)
@@ -99,16 +100,22 @@ pub fn point(
     [
         record(position, if cone.is_some() { SPOT } else { POINT }),
         record(axis, NONE),
-        [scale, outer, 0.0, 0.0],
+        [scale, outer, (radius * radius) as f32, 0.0],
         record(intensity.into(), 0),
         [0.0; 4],
     ]
 }
 
-/// Parallel light.
-pub fn directional(towards: glam::Vec3, illuminance: [f32; 3]) -> [[f32; 4]; RECORDS as usize] {
-    let zero = glam::Vec3::ZERO;
-    [record(towards, DIRECTIONAL), record(zero, NONE), [0.0; 4], record(illuminance.into(), 0), [0.0; 4]]
+/// Parallel light, or that of a sun of `angular_radius` radians.
+pub fn directional(
+    towards: glam::Vec3,
+    illuminance: [f32; 3],
+    angular_radius: f64,
+) -> [[f32; 4]; RECORDS as usize] {
+    // 1 - cos, without its loss of digits.
+    let size = 2.0 * (0.5 * angular_radius).sin().powi(2);
+    let (axis, size) = (record(glam::Vec3::ZERO, NONE), [0.0, 0.0, size as f32, 0.0]);
+    [record(towards, DIRECTIONAL), axis, size, record(illuminance.into(), 0), [0.0; 4]]
 }
 
 /// Stands for the environment.
@@ -130,6 +137,12 @@ impl<L: Lanes> Element<L> {
             (at + L::U::splat(3)).records(elements),
         ];
         Self { records, normal: at + L::U::splat(4), pmf, density }
+    }
+
+    /// The same element in every lane, certainly chosen; its records come first in `elements`.
+    #[inline(always)]
+    pub fn splat(elements: &[[f32; 4]]) -> Self {
+        Self::load(elements, L::U::splat(0), L::F::one(), L::F::zero())
     }
 
     /// Lanes whose element is the environment.
@@ -198,7 +211,7 @@ impl<L: Lanes> Element<L> {
             radiance,
             wi,
             pdf,
-            is_delta: L::M::from_bits(0),
+            is_hidden: L::M::from_bits(0),
             end,
             is_distant: L::M::from_bits(0),
             valid: finite & radiance.max_component().gt(L::F::zero()),
@@ -206,7 +219,7 @@ impl<L: Lanes> Element<L> {
         }
     }
 
-    /// The point, spot and directional lights.
+    /// The point, spot and directional lights without size.
     #[inline(always)]
     pub fn sample_punctual(&self, p: V3<L>) -> LightSample<L> {
         let record = &self.records;
@@ -226,7 +239,7 @@ impl<L: Lanes> Element<L> {
             radiance,
             wi,
             pdf: self.pmf,
-            is_delta: L::M::first(L::N),
+            is_hidden: L::M::first(L::N),
             end: place,
             is_distant,
             valid: radiance.is_finite() & wi.is_finite() & radiance.max_component().gt(zero) & self.pmf.gt(zero),
@@ -244,7 +257,7 @@ pub fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: L::F, u
         radiance: sample.radiance,
         wi: sample.direction,
         pdf,
-        is_delta: L::M::from_bits(0),
+        is_hidden: L::M::from_bits(0),
         end: sample.direction,
         is_distant: L::M::first(L::N),
         valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),

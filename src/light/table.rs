@@ -5,15 +5,17 @@
 //! the stratification of the numbers).
 
 use super::bounds::Bounds;
-use super::choice::{Candidates, Choice, Receiver, Sky};
+use super::choice::{Candidates, Choice, Receiver, Sky, Sun};
 use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
+use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
 use crate::shape::table::{NONE, TriangleTable};
 use crate::texture::lookup::TextureTable;
 use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
+use std::ops::Range;
 
 /// A light in the prepared scene's space. Its radiance, intensity or illuminance is above 0 and finite.
 #[derive(Clone, Debug)]
@@ -37,6 +39,8 @@ pub enum PreparedLight {
         intensity: [f32; 3],
         /// Unit axis and the cosines of the inner and outer half angles.
         cone: Option<(glam::Vec3, f32, f32)>,
+        /// Of the ball that it is, metres; 0: none.
+        radius: f64,
     },
     /// Parallel light.
     Directional {
@@ -44,6 +48,8 @@ pub enum PreparedLight {
         towards: glam::Vec3,
         /// lux per channel.
         illuminance: [f32; 3],
+        /// Half the angle that it is seen at, radians, at most pi/2; 0: none.
+        angular_radius: f64,
     },
 }
 
@@ -73,6 +79,11 @@ pub struct LightTable {
     emissive_meshes: usize,
     emissive_triangles: usize,
     has_punctual: bool,
+    /// Some of them have a size.
+    has_sized: bool,
+    /// Numbers of the lights with a size that scattered rays find.
+    balls: Range<u32>,
+    suns: Range<u32>,
     environment: Option<EnvironmentTable>,
     samples_environment: bool,
     /// How one is chosen; `None` for a single light.
@@ -87,11 +98,11 @@ impl LightTable {
         radius: f64,
         triangles: &mut TriangleTable,
     ) -> Self {
-        // Stable: surfaces, points, suns.
+        // Stable: surfaces, balls, points, suns.
         lights.sort_by_key(|light| match light {
             PreparedLight::Mesh { .. } => 0,
-            PreparedLight::Point { .. } => 1,
-            PreparedLight::Directional { .. } => 2,
+            PreparedLight::Point { radius, .. } => 1 + u8::from(*radius <= 0.0),
+            PreparedLight::Directional { .. } => 3,
         });
         let mut table = Self::default();
         // An environment that is the same all around is left to scattered rays, which find it wherever they go.
@@ -111,6 +122,9 @@ impl LightTable {
             table.push_element(0, 0, 0.0, element::environment());
         }
         table.environment = environment;
+        if table.choice.as_ref().is_some_and(|choice| !choice.finds_balls()) {
+            table.balls = 0..0;
+        }
         table
     }
 
@@ -136,12 +150,20 @@ impl LightTable {
                 self.emissive_meshes += 1;
                 self.emissive_triangles += lamps.len();
             }
-            &PreparedLight::Point { position, intensity, cone } => {
-                self.push_element(0, 0, 0.0, element::point(position, intensity, cone));
+            &PreparedLight::Point { position, intensity, cone, radius } => {
+                if radius > 0.0 {
+                    extend(&mut self.balls, self.lights.len() as u32);
+                    self.has_sized = true;
+                }
+                self.push_element(0, 0, 0.0, element::point(position, intensity, cone, radius));
                 self.has_punctual = true;
             }
-            &PreparedLight::Directional { towards, illuminance } => {
-                self.push_element(0, 0, 0.0, element::directional(towards, illuminance));
+            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
+                if angular_radius > 0.0 {
+                    extend(&mut self.suns, self.lights.len() as u32);
+                    self.has_sized = true;
+                }
+                self.push_element(0, 0, 0.0, element::directional(towards, illuminance, angular_radius));
                 self.has_punctual = true;
             }
         }
@@ -188,6 +210,51 @@ impl LightTable {
     /// There is light from all around.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()
+    }
+
+    /// Numbers of the point and spot lights that scattered rays find: those that are balls, unless they are too many.
+    pub fn balls(&self) -> Range<u32> {
+        self.balls.clone()
+    }
+
+    /// Numbers of the directional lights that scattered rays find: those with an angle.
+    pub fn suns(&self) -> Range<u32> {
+        self.suns.clone()
+    }
+
+    /// What rays from `p` along the unit vectors `d` meet of the light `number` of [`Self::balls`], and the density with
+    /// which it is sampled from `from` (receivers and sums; `None` in scenes without a choice), 1/sr.
+    #[inline(always)]
+    pub fn ball<L: Lanes>(&self, number: u32, p: V3<L>, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
+        let met = Element::splat(self.records(number)).meet_ball(p, d);
+        if !met.meets.any() {
+            return met;
+        }
+        let pmf = match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf_of_ball(number, at, *total),
+            _ => L::F::one(),
+        };
+        Met { pdf: met.pdf * pmf, ..met }
+    }
+
+    /// [`Self::ball`] of the light `number` of [`Self::suns`].
+    #[inline(always)]
+    pub fn sun<L: Lanes>(&self, number: u32, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
+        let met = Element::splat(self.records(number)).meet_sun(d);
+        if !met.meets.any() {
+            return met;
+        }
+        let pmf = match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf_of_sun(number, at, *total),
+            _ => L::F::one(),
+        };
+        Met { pdf: met.pdf * pmf, ..met }
+    }
+
+    /// Records of the elements of a light, and those after them.
+    fn records(&self, light: u32) -> &[[f32; 4]] {
+        let first = self.lights[light as usize][0].to_bits();
+        &self.elements[(first * element::RECORDS) as usize..]
     }
 
     /// Whether the probability of a light depends on the point that it lights.
@@ -266,10 +333,15 @@ impl LightTable {
     }
 }
 
+/// Appends a number to those from the first to the last.
+fn extend(numbers: &mut Range<u32>, number: u32) {
+    *numbers = if numbers.end == 0 { number } else { numbers.start }..number + 1;
+}
+
 /// How `lights` look from afar.
 fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candidates {
     let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-    let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, suns: Vec::new(), sky, radius };
+    let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, balls: 0, suns: Vec::new(), sky, radius };
     for light in lights {
         match light {
             PreparedLight::Mesh { triangles, radiance, both_sides, .. } => {
@@ -277,18 +349,21 @@ fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candid
                 candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides));
                 candidates.surfaces += 1;
             }
-            &PreparedLight::Point { position, intensity, cone } => {
+            &PreparedLight::Point { position, intensity, cone, radius } => {
                 let (position, intensity) = (position.as_dvec3(), mean(intensity));
-                candidates.placed.push(match cone {
+                let small = match cone {
                     Some((axis, inner, outer)) => {
                         let (inner, outer) = (f64::from(inner), f64::from(outer));
                         Bounds::of_spot(position, intensity, axis.as_dvec3(), inner, outer)
                     }
                     None => Bounds::of_point(position, intensity),
-                });
+                };
+                candidates.placed.push(small.with_radius(radius));
+                candidates.balls += usize::from(radius > 0.0);
             }
-            &PreparedLight::Directional { towards, illuminance } => {
-                candidates.suns.push((towards.as_dvec3(), mean(illuminance)));
+            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
+                let (towards, illuminance) = (towards.as_dvec3(), mean(illuminance));
+                candidates.suns.push(Sun { towards, illuminance, angular_radius });
             }
         }
     }
@@ -343,7 +418,12 @@ impl LightTable {
         if !self.has_punctual {
             return element.sample_triangle(&self.elements, p, u, sources);
         }
-        let punctual = element.sample_punctual(p);
+        let punctual = if self.has_sized {
+            // Balls that are too many to be looked for.
+            element.sample_sized(p, u, self.choice.as_ref().is_none_or(Choice::finds_balls))
+        } else {
+            element.sample_punctual(p)
+        };
         let on_triangle = element.is_triangle();
         if !self.has_triangles() || !on_triangle.any() {
             return punctual;
@@ -359,7 +439,7 @@ fn merged<L: Lanes>(lanes: L::M, a: LightSample<L>, b: LightSample<L>) -> LightS
         radiance: a.radiance.or_else(lanes, b.radiance),
         wi: a.wi.or_else(lanes, b.wi),
         pdf: a.pdf.or_else(lanes, b.pdf),
-        is_delta: (a.is_delta & lanes) | (b.is_delta & !lanes),
+        is_hidden: (a.is_hidden & lanes) | (b.is_hidden & !lanes),
         end: a.end.or_else(lanes, b.end),
         is_distant: (a.is_distant & lanes) | (b.is_distant & !lanes),
         valid: (a.valid & lanes) | (b.valid & !lanes),

@@ -220,14 +220,14 @@ fn prepare_all(
     }
     warnings.extend(losses.iter().cloned());
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
-    punctual(scene, origin, &mut lights);
+    punctual(scene, origin, settings, &mut lights);
     let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
     let environment = environment(scene, default_light.used);
     if lights.is_empty() && environment.is_none() {
         warnings.push(default_light.darkness(scene));
     }
-    warnings.extend(refraction::lights_that_glass_hides(scene));
     let lights = LightTable::new(lights, environment, radius, &mut triangles);
+    warnings.extend(refraction::lights_that_glass_hides(scene, !lights.balls().is_empty(), !lights.suns().is_empty()));
     let media = MediumTable::new(&scene.materials);
     let spectrum = media.has_dispersion().then(Spectrum::default);
     let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
@@ -402,19 +402,21 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
 }
 
 /// Adds the punctual lights that shine at all.
-fn punctual(scene: &Scene, origin: DVec3, lights: &mut Vec<PreparedLight>) {
+fn punctual(scene: &Scene, origin: DVec3, settings: &RenderSettings, lights: &mut Vec<PreparedLight>) {
+    let (radius, angular_radius) = (settings.light_radius, 0.5 * settings.sun_angle.to_radians());
     for placed in &scene.lights {
         let position = (placed.world_from_light.w_axis.truncate() - origin).as_vec3();
         let axis = -placed.world_from_light.z_axis.truncate().normalize();
         let (light, color) = match placed.light {
-            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None }, intensity),
+            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None, radius }, intensity),
             Light::Spot { intensity, inner_cone, outer_cone } => {
                 let (inner, outer) = (f64::from(inner_cone).cos(), f64::from(outer_cone).cos());
                 let cone = Some((axis.as_vec3(), inner as f32, outer as f32));
-                (PreparedLight::Point { position, intensity, cone }, intensity)
+                (PreparedLight::Point { position, intensity, cone, radius }, intensity)
             }
             Light::Directional { illuminance } => {
-                (PreparedLight::Directional { towards: (-axis).as_vec3(), illuminance }, illuminance)
+                let towards = (-axis).as_vec3();
+                (PreparedLight::Directional { towards, illuminance, angular_radius }, illuminance)
             }
         };
         // Not for NaN either.
