@@ -1,6 +1,7 @@
-//! What light samples come from: triangles of glowing surfaces, punctual lights, the environment.
+//! What light samples come from: triangles of glowing surfaces, bulbs, punctual lights, the environment.
 
 use super::bounds::spot_scale;
+use super::bulb::Bulb;
 use super::environment::EnvironmentTable;
 use super::table::Sources;
 use crate::math::{UvSets, V3, robust};
@@ -13,7 +14,7 @@ use simd::{Float, Lanes, Mask, Uint};
 /// |---|---|---|
 /// | 0 | corner, position or direction towards the light | kind |
 /// | 1 | edge 1, or the spot's axis | attributes |
-/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius, or 1 - cos of the sun's | - |
+/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | - |
 /// | 3 | intensity or illuminance | material |
 /// | 4 | unit normal | offset length |
 pub const RECORDS: u32 = 5;
@@ -22,6 +23,7 @@ const POINT: u32 = 1;
 const SPOT: u32 = 2;
 const DIRECTIONAL: u32 = 3;
 const ENVIRONMENT: u32 = 4;
+const BULB: u32 = 5;
 
 /// An emissive triangle.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +42,7 @@ pub struct LampTriangle {
 
 /// A point on a light seen from a shading point.
 pub struct LightSample<L: Lanes> {
-    /// Radiance of an area light, nits; of the others what a surface that faces them gets, lux.
+    /// Radiance, nits; where `is_hidden` what a surface that faces the light gets, lux; 1 where a surface is `sought`.
     pub radiance: V3<L>,
     /// Unit, towards the light.
     pub wi: V3<L>,
@@ -50,6 +52,8 @@ pub struct LightSample<L: Lanes> {
     pub is_hidden: L::M,
     /// Where the shadow ray ends, already off the light's surface; the direction itself for directional lights.
     pub end: V3<L>,
+    /// Number of the light whose surface the shadow ray is to meet, for its radiance there; [`NONE`] where it is known.
+    pub sought: L::U,
     /// Lanes whose light is infinitely far.
     pub is_distant: L::M,
     /// Lanes that receive anything.
@@ -84,6 +88,12 @@ pub fn triangle(lamp: &LampTriangle, material: u32) -> [[f32; 4]; RECORDS as usi
         record(glam::Vec3::ZERO, material),
         record(ng, offset.to_bits()),
     ]
+}
+
+/// A bulb, whose radiance is where it is hit.
+pub fn bulb(bulb: &Bulb) -> [[f32; 4]; RECORDS as usize] {
+    let size = [0.0, 0.0, (bulb.radius * bulb.radius) as f32, 0.0];
+    [record(bulb.centre, BULB), record(glam::Vec3::ZERO, NONE), size, [0.0; 4], [0.0; 4]]
 }
 
 /// A point light, or a spot light about an axis with the cosines of its inner and outer half angles; a ball of `radius`.
@@ -157,6 +167,12 @@ impl<L: Lanes> Element<L> {
         self.records[0][3].to_bits().eq(L::U::splat(TRIANGLE))
     }
 
+    /// Lanes whose element is a triangle or a bulb.
+    #[inline(always)]
+    pub fn is_surface(&self) -> L::M {
+        self.is_triangle() | self.records[0][3].to_bits().eq(L::U::splat(BULB))
+    }
+
     /// A point on the triangles, as seen from `p`.
     #[inline(always)]
     pub fn sample_triangle(
@@ -213,6 +229,7 @@ impl<L: Lanes> Element<L> {
             pdf,
             is_hidden: L::M::from_bits(0),
             end,
+            sought: L::U::splat(NONE),
             is_distant: L::M::from_bits(0),
             valid: finite & radiance.max_component().gt(L::F::zero()),
             total: L::F::zero(),
@@ -241,6 +258,7 @@ impl<L: Lanes> Element<L> {
             pdf: self.pmf,
             is_hidden: L::M::first(L::N),
             end: place,
+            sought: L::U::splat(NONE),
             is_distant,
             valid: radiance.is_finite() & wi.is_finite() & radiance.max_component().gt(zero) & self.pmf.gt(zero),
             total: zero,
@@ -259,6 +277,7 @@ pub fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: L::F, u
         pdf,
         is_hidden: L::M::from_bits(0),
         end: sample.direction,
+        sought: L::U::splat(NONE),
         is_distant: L::M::first(L::N),
         valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
         total: L::F::zero(),

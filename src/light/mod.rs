@@ -1,6 +1,7 @@
 //! Punctual lights (`KHR_lights_punctual`) and environments. Emissive surfaces are materials.
 
 pub mod bounds;
+pub mod bulb;
 pub mod choice;
 pub mod element;
 pub mod environment;

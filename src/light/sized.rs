@@ -1,4 +1,5 @@
-//! Point and spot lights that are balls (`--light-radius`), directional ones that are discs in the sky (`--sun-angle`).
+//! Point and spot lights that are balls (`--light-radius`), directional ones that are discs in the sky (`--sun-angle`);
+//! glowing meshes that are bulbs (`bulb.rs`).
 //!
 //! Both fill a cone of directions, each of which is as likely to be sampled. A ball of intensity I has the radiance
 //! `I / (pi r^2)`, a sun of illuminance E `E / (pi sin^2)` of its angular radius: where all of it is above the horizon, a
@@ -8,7 +9,7 @@
 use super::element::{Element, LightSample};
 use crate::math::lanes::{cos_sin_2pi, safe_sqrt};
 use crate::math::{Frame, V3};
-use simd::{Float, Lanes};
+use simd::{Float, Lanes, Mask};
 use std::f32::consts::{PI, TAU};
 
 /// Where rays meet a light with a size.
@@ -30,7 +31,58 @@ fn depth_of_ball<L: Lanes>(sin2: L::F) -> L::F {
     sin2 / (one + safe_sqrt(one - sin2))
 }
 
+/// Directions in the cones of 1 - cos `depth` about `axis` (unit), each as likely; 1 - cos of each from the axis.
+#[inline(always)]
+fn in_cone<L: Lanes>(axis: V3<L>, depth: L::F, u: [L::F; 2]) -> (V3<L>, L::F) {
+    let below = u[0] * depth;
+    let sin = safe_sqrt(below * (L::F::splat(2.0) - below));
+    let (c, s) = cos_sin_2pi::<L>(u[1]);
+    (Frame::around(axis).to_world(V3::new(sin * c, sin * s, L::F::one() - below)), below)
+}
+
+/// One over the cone at which a ball is seen, 1/sr; 0 inside of it.
+#[inline(always)]
+fn pdf_of_ball<F: Float>(radius2: F, distance2: F) -> F {
+    let one = F::one();
+    let sin2 = radius2 / distance2;
+    // (1 - cos) = sin^2 / (1 + cos).
+    let pdf = (one + safe_sqrt(one - sin2)) / (sin2 * F::splat(TAU));
+    pdf.masked(sin2.lt(one))
+}
+
 impl<L: Lanes> Element<L> {
+    /// Directions towards the bulbs number `light`, as seen from `p`: none from within their spheres. What the ray meets is
+    /// to be found.
+    #[inline(always)]
+    pub fn sample_bulb(&self, light: L::U, p: V3<L>, u: [L::F; 2]) -> LightSample<L> {
+        let (one, none) = (L::F::one(), L::M::from_bits(0));
+        let v = V3::<L>::of_record(&self.records[0]) - p;
+        let distance2 = v.dot(v);
+        let distance = distance2.sqrt();
+        let cone_pdf = pdf_of_ball(self.records[2][2], distance2);
+        let (wi, _) = in_cone(v.scale(one / distance), depth_of_ball::<L>(self.records[2][2] / distance2), u);
+        let pdf = self.pmf * cone_pdf;
+        LightSample {
+            radiance: V3::splat([1.0; 3]),
+            wi,
+            pdf,
+            is_hidden: none,
+            // Behind it.
+            end: wi.mul_add(distance + self.records[2][2].sqrt(), p),
+            sought: light,
+            is_distant: none,
+            valid: pdf.gt(L::F::zero()) & pdf.is_finite() & wi.is_finite(),
+            total: L::F::zero(),
+        }
+    }
+
+    /// Density (1/sr) of a direction towards the bulbs from `p`, given that they are chosen: 0 within their spheres.
+    #[inline(always)]
+    pub fn pdf_of_bulb(&self, p: V3<L>) -> L::F {
+        let v = V3::<L>::of_record(&self.records[0]) - p;
+        pdf_of_ball(self.records[2][2], v.dot(v))
+    }
+
     /// The point, spot and directional lights, as seen from `p`, a point outside of them. Scattered rays find
     /// suns and, if `finds_balls`, balls.
     #[inline(always)]
@@ -45,12 +97,8 @@ impl<L: Lanes> Element<L> {
         let outside = small.is_distant | sin2.lt(one);
         let depth = size.or_else(small.is_distant, depth_of_ball::<L>(sin2));
         let sin2_of_cone = (depth * (two - depth)).or_else(small.is_distant, sin2);
-        // 1 - cos of the direction.
-        let below = u[0] * depth;
+        let (wi, below) = in_cone(small.wi, depth, u);
         let sin2_of_direction = below * (two - below);
-        let sin = safe_sqrt(sin2_of_direction);
-        let (c, s) = cos_sin_2pi::<L>(u[1]);
-        let wi = Frame::around(small.wi).to_world(V3::new(sin * c, sin * s, one - below));
         // The near side of the ball, in units of the distance to its middle.
         let t = (one - sin2) / ((one - below) + safe_sqrt(sin2 - sin2_of_direction));
         let near = wi.mul_add(t * distance2.sqrt(), p);

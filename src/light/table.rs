@@ -5,13 +5,14 @@
 //! the stratification of the numbers).
 
 use super::bounds::Bounds;
+use super::bulb::Bulb;
 use super::choice::{Candidates, Choice, Receiver, Sky, Sun};
 use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
 use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
-use crate::shape::table::{NONE, TriangleTable};
+use crate::shape::table::TriangleTable;
 use crate::texture::lookup::TextureTable;
 use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
@@ -30,6 +31,8 @@ pub enum PreparedLight {
         both_sides: bool,
         /// Material index; emission is looked up there.
         material: u32,
+        /// The sphere around it, if it is to be sampled by that.
+        bulb: Option<Bulb>,
     },
     /// A point light, or a spot light about an axis.
     Point {
@@ -53,6 +56,15 @@ pub enum PreparedLight {
     },
 }
 
+impl PreparedLight {
+    /// Has a bulb sampled by points on its surface.
+    pub fn forget_bulb(&mut self) {
+        if let Self::Mesh { bulb, .. } = self {
+            *bulb = None;
+        }
+    }
+}
+
 /// What of the scene lights are read from.
 #[derive(Clone, Copy)]
 pub struct Sources<'a> {
@@ -64,13 +76,16 @@ pub struct Sources<'a> {
     pub textures: &'a TextureTable,
 }
 
+/// In place of a density.
+const IS_BULB: f64 = -1.0;
+
 /// The lights of a scene, in the order of their numbers: those with a place, then suns, then the environment.
 #[derive(Clone, Debug, Default)]
 pub struct LightTable {
     /// [`element::RECORDS`] each, those of a light together.
     elements: Vec<[f32; 4]>,
     /// A light's first element, the first of its `ends`, how many these are, and the density of a point on it given that
-    /// it is chosen, 1/m^2.
+    /// it is chosen, 1/m^2, or [`IS_BULB`].
     lights: Vec<[f32; 4]>,
     /// Upper ends of the triangles' shares of their light, a table a mesh.
     ends: Vec<f32>,
@@ -78,6 +93,9 @@ pub struct LightTable {
     most_ends: u32,
     emissive_meshes: usize,
     emissive_triangles: usize,
+    /// Surfaces that are sampled by points on them.
+    has_lamps: bool,
+    has_bulbs: bool,
     has_punctual: bool,
     /// Some of them have a size.
     has_sized: bool,
@@ -130,8 +148,19 @@ impl LightTable {
 
     fn push(&mut self, light: &PreparedLight, triangles: &mut TriangleTable) {
         match light {
-            PreparedLight::Mesh { triangles: lamps, material, .. } => {
+            PreparedLight::Mesh { triangles: lamps, bulb: Some(bulb), .. } => {
                 let number = self.lights.len() as u32;
+                for lamp in lamps {
+                    triangles.set_light(lamp.primitive as usize, number);
+                }
+                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
+                self.emissive_meshes += 1;
+                self.emissive_triangles += lamps.len();
+                self.has_bulbs = true;
+            }
+            PreparedLight::Mesh { triangles: lamps, material, bulb: None, .. } => {
+                let number = self.lights.len() as u32;
+                self.has_lamps = true;
                 let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
                 let first_end = self.ends.len();
                 distribution::push_ends(&areas, &mut self.ends);
@@ -273,17 +302,26 @@ impl LightTable {
         Receiver { p, n, both_sides: L::M::from_bits(0), least: L::F::zero() }
     }
 
-    /// Density (1/m^2) of a point on the surfaces `light`, given that they are chosen; 0 for [`NONE`].
+    /// Density (1/sr) of the point `at` on the surfaces `light` (a number of a light), seen in the unit direction -`wo` from
+    /// `distance` metres away, at the cosine `cos` to its normal; given that they are chosen.
     #[inline(always)]
-    pub fn density<L: Lanes>(&self, light: L::U) -> L::F {
-        let is_light = !light.eq(L::U::splat(NONE));
-        if !is_light.any() {
-            return L::F::zero();
+    pub fn density<L: Lanes>(&self, light: L::U, at: V3<L>, wo: V3<L>, distance: L::F, cos: L::F) -> L::F {
+        let record = light.records(&self.lights);
+        let density = record[3] * distance * distance / cos;
+        if !self.has_bulbs {
+            return density;
         }
-        light.records(&self.lights)[3].masked(is_light)
+        let is_bulb = record[3].lt(L::F::zero());
+        let element = Element::<L>::load(&self.elements, record[0].to_bits(), L::F::one(), L::F::one());
+        element.pdf_of_bulb(wo.mul_add(distance, at)).or_else(is_bulb, density)
     }
 
-    /// Probability with which [`Self::sample`] chooses the surfaces `light` (not [`NONE`]) from the receivers and sums of
+    /// Some lights are sampled by rays that look for them, see [`LightSample::sought`].
+    pub fn has_bulbs(&self) -> bool {
+        self.has_bulbs
+    }
+
+    /// Probability with which [`Self::sample`] chooses the surfaces `light` (no other number) from the receivers and sums of
     /// `from`: `None` in scenes without a choice.
     #[inline(always)]
     pub fn pmf<L: Lanes>(&self, light: L::U, from: Option<(Receiver<L>, L::F)>) -> L::F {
@@ -394,14 +432,14 @@ impl<L: Lanes> Part<L> for Sample<'_, L> {
         }
         let element = Element::<L>::load(&lights.elements, index, pmf, record[3]);
         let Some(environment) = lights.environment.as_ref().filter(|_| lights.samples_environment) else {
-            return lights.sample_near(&element, p, [u[1], u[2]], &sources);
+            return lights.sample_near(&element, light, p, [u[1], u[2]], &sources);
         };
         let far = element.is_environment();
         let sky = sample_environment(environment, pmf, [u[1], u[2]]);
         if !lights.has_triangles() && !lights.has_punctual {
             return sky;
         }
-        merged(far, sky, lights.sample_near(&element, p, [u[1], u[2]], &sources))
+        merged(far, sky, lights.sample_near(&element, light, p, [u[1], u[2]], &sources))
     }
 }
 
@@ -411,12 +449,13 @@ impl LightTable {
     fn sample_near<L: Lanes>(
         &self,
         element: &Element<L>,
+        light: L::U,
         p: V3<L>,
         u: [L::F; 2],
         sources: &Sources<'_>,
     ) -> LightSample<L> {
         if !self.has_punctual {
-            return element.sample_triangle(&self.elements, p, u, sources);
+            return self.sample_surface(element, light, p, u, sources);
         }
         let punctual = if self.has_sized {
             // Balls that are too many to be looked for.
@@ -424,11 +463,32 @@ impl LightTable {
         } else {
             element.sample_punctual(p)
         };
-        let on_triangle = element.is_triangle();
-        if !self.has_triangles() || !on_triangle.any() {
+        let on_surface = element.is_surface();
+        if !self.has_triangles() || !on_surface.any() {
             return punctual;
         }
-        merged(on_triangle, element.sample_triangle(&self.elements, p, u, sources), punctual)
+        merged(on_surface, self.sample_surface(element, light, p, u, sources), punctual)
+    }
+
+    /// Lamps and bulbs.
+    #[inline(always)]
+    fn sample_surface<L: Lanes>(
+        &self,
+        element: &Element<L>,
+        light: L::U,
+        p: V3<L>,
+        u: [L::F; 2],
+        sources: &Sources<'_>,
+    ) -> LightSample<L> {
+        if !self.has_bulbs {
+            return element.sample_triangle(&self.elements, p, u, sources);
+        }
+        let bulb = element.sample_bulb(light, p, u);
+        let on_triangle = element.is_triangle();
+        if !self.has_lamps || !on_triangle.any() {
+            return bulb;
+        }
+        merged(on_triangle, element.sample_triangle(&self.elements, p, u, sources), bulb)
     }
 }
 
@@ -441,6 +501,7 @@ fn merged<L: Lanes>(lanes: L::M, a: LightSample<L>, b: LightSample<L>) -> LightS
         pdf: a.pdf.or_else(lanes, b.pdf),
         is_hidden: (a.is_hidden & lanes) | (b.is_hidden & !lanes),
         end: a.end.or_else(lanes, b.end),
+        sought: a.sought.or_else(lanes, b.sought),
         is_distant: (a.is_distant & lanes) | (b.is_distant & !lanes),
         valid: (a.valid & lanes) | (b.valid & !lanes),
         total: a.total.or_else(lanes, b.total),

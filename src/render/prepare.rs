@@ -12,6 +12,7 @@ use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables, Spectrum};
+use crate::light::bulb::Bulb;
 use crate::light::element::LampTriangle;
 use crate::light::environment::EnvironmentTable;
 use crate::light::parts::connected;
@@ -226,9 +227,15 @@ fn prepare_all(
     if lights.is_empty() && environment.is_none() {
         warnings.push(default_light.darkness(scene));
     }
+    let media = MediumTable::new(&scene.materials);
+    if media.has_thin_glass() {
+        // Shadow rays go through it step by step, to an end that they know.
+        for light in &mut lights {
+            light.forget_bulb();
+        }
+    }
     let lights = LightTable::new(lights, environment, radius, &mut triangles);
     warnings.extend(refraction::lights_that_glass_hides(scene, !lights.balls().is_empty(), !lights.suns().is_empty()));
-    let media = MediumTable::new(&scene.materials);
     let spectrum = media.has_dispersion().then(Spectrum::default);
     let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
     let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
@@ -318,7 +325,8 @@ fn flatten(
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
     let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
-    let part = parts.of(opacities.let_rays_pass(scene, mesh));
+    let lets_rays_pass = opacities.let_rays_pass(scene, mesh);
+    let part = parts.of(lets_rays_pass);
     let triangles = &mut part.triangles;
     let first = triangles.positions.len() as u32;
     triangles.positions.extend(mesh.positions.iter().map(|&p| {
@@ -384,7 +392,9 @@ fn flatten(
         let both_sides = material.is_some_and(|m| m.double_sided);
         for triangles in connected(lamps) {
             let material = mesh.material.0;
-            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material });
+            // What is there in part only would have to be asked about twice.
+            let bulb = if lets_rays_pass { None } else { Bulb::of(&triangles) };
+            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material, bulb });
         }
         totals.surface.add(mesh_area, material, emission);
     }
