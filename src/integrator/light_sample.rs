@@ -9,8 +9,8 @@ use super::pool::PathPool;
 use super::shade::add_lanes;
 use super::weight::weight;
 use crate::light::choice::Receiver;
-use crate::math::V3;
 use crate::material::media::AIR;
+use crate::math::V3;
 use crate::shape::table::NONE;
 use simd::{Float, Lanes, Mask, Uint};
 

@@ -3,6 +3,7 @@
 use super::bounds::spot_scale;
 use super::bulb::Bulb;
 use super::environment::EnvironmentTable;
+use super::quad::Quad;
 use super::table::Sources;
 use crate::math::{UvSets, V3, robust};
 use crate::shape::table::NONE;
@@ -13,9 +14,9 @@ use simd::{Float, Lanes, Mask, Uint};
 /// | record | x, y, z | w |
 /// |---|---|---|
 /// | 0 | corner, position or direction towards the light | kind |
-/// | 1 | edge 1, or the spot's axis | attributes |
-/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | - |
-/// | 3 | intensity or illuminance | material |
+/// | 1 | edge 1, or the spot's axis | attributes; of a parallelogram those of its first half |
+/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | attributes of a parallelogram's second half |
+/// | 3 | intensity or illuminance; which corners of its halves the parallelogram's edges leave: 2 bits each | material |
 /// | 4 | unit normal | offset length |
 pub const RECORDS: u32 = 5;
 const TRIANGLE: u32 = 0;
@@ -24,6 +25,7 @@ const SPOT: u32 = 2;
 const DIRECTIONAL: u32 = 3;
 const ENVIRONMENT: u32 = 4;
 const BULB: u32 = 5;
+const QUAD: u32 = 6;
 
 /// An emissive triangle.
 #[derive(Clone, Copy, Debug)]
@@ -79,13 +81,31 @@ fn record(v: glam::Vec3, w: u32) -> [f32; 4] {
 /// A triangle of a surface of `material`.
 pub fn triangle(lamp: &LampTriangle, material: u32) -> [[f32; 4]; RECORDS as usize] {
     let LampTriangle { corners, ng, attributes, .. } = *lamp;
-    let max_abs = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
-    let offset = ng.abs().element_sum() * max_abs.max_element() * robust::gamma(16);
+    let offset = offset_length(&corners, ng);
     [
         record(corners[0], TRIANGLE),
         record(corners[1] - corners[0], attributes),
         record(corners[2] - corners[0], 0),
         record(glam::Vec3::ZERO, material),
+        record(ng, offset.to_bits()),
+    ]
+}
+
+/// How far shadow rays end off a light's surface with these corners, metres.
+fn offset_length(corners: &[glam::Vec3], ng: glam::Vec3) -> f32 {
+    let max_abs = corners.iter().fold(glam::Vec3::ZERO, |most, corner| most.max(corner.abs()));
+    ng.abs().element_sum() * max_abs.max_element() * robust::gamma(16)
+}
+
+/// A parallelogram of `material` with the unit normal `ng`.
+pub fn quad(quad: &Quad, ng: glam::Vec3, material: u32) -> [[f32; 4]; RECORDS as usize] {
+    let Quad { v0, e1, e2, attributes: [near, far], apex: [i, k] } = *quad;
+    let offset = offset_length(&[v0, v0 + e1, v0 + e2, v0 + e1 + e2], ng);
+    [
+        record(v0, QUAD),
+        record(e1, near),
+        record(e2, far),
+        [f32::from_bits(i | k << 2), 0.0, 0.0, f32::from_bits(material)],
         record(ng, offset.to_bits()),
     ]
 }
@@ -117,11 +137,7 @@ pub fn point(
 }
 
 /// Parallel light, or that of a sun of `angular_radius` radians.
-pub fn directional(
-    towards: glam::Vec3,
-    illuminance: [f32; 3],
-    angular_radius: f64,
-) -> [[f32; 4]; RECORDS as usize] {
+pub fn directional(towards: glam::Vec3, illuminance: [f32; 3], angular_radius: f64) -> [[f32; 4]; RECORDS as usize] {
     // 1 - cos, without its loss of digits.
     let size = 2.0 * (0.5 * angular_radius).sin().powi(2);
     let (axis, size) = (record(glam::Vec3::ZERO, NONE), [0.0, 0.0, size as f32, 0.0]);
@@ -161,27 +177,26 @@ impl<L: Lanes> Element<L> {
         self.records[0][3].to_bits().eq(L::U::splat(ENVIRONMENT))
     }
 
-    /// Lanes whose element is a triangle.
+    /// Lanes whose element is a triangle or a parallelogram.
     #[inline(always)]
-    pub fn is_triangle(&self) -> L::M {
-        self.records[0][3].to_bits().eq(L::U::splat(TRIANGLE))
+    pub fn is_lamp(&self) -> L::M {
+        self.records[0][3].to_bits().eq(L::U::splat(TRIANGLE)) | self.is_quad()
     }
 
-    /// Lanes whose element is a triangle or a bulb.
+    #[inline(always)]
+    fn is_quad(&self) -> L::M {
+        self.records[0][3].to_bits().eq(L::U::splat(QUAD))
+    }
+
+    /// Lanes whose element is a lamp or a bulb.
     #[inline(always)]
     pub fn is_surface(&self) -> L::M {
-        self.is_triangle() | self.records[0][3].to_bits().eq(L::U::splat(BULB))
+        self.is_lamp() | self.records[0][3].to_bits().eq(L::U::splat(BULB))
     }
 
-    /// A point on the triangles, as seen from `p`.
+    /// A point on the triangles and parallelograms, each as likely, as seen from `p`.
     #[inline(always)]
-    pub fn sample_triangle(
-        &self,
-        elements: &[[f32; 4]],
-        p: V3<L>,
-        u: [L::F; 2],
-        sources: &Sources<'_>,
-    ) -> LightSample<L> {
+    pub fn sample_lamp(&self, elements: &[[f32; 4]], p: V3<L>, u: [L::F; 2], sources: &Sources<'_>) -> LightSample<L> {
         let Self { records, pmf, density, .. } = self;
         let Sources { triangles, materials, textures } = *sources;
         let normal = self.normal.records(elements);
@@ -191,8 +206,9 @@ impl<L: Lanes> Element<L> {
         let half = L::F::splat(0.5);
         let upper = u[1].gt(u[0]);
         let small = u[0].min(u[1]) * half;
-        let b1 = small.or_else(upper, u[0] - small);
-        let b2 = (u[1] - small).or_else(upper, small);
+        let is_quad = self.is_quad();
+        let b1 = u[0].or_else(is_quad, small.or_else(upper, u[0] - small));
+        let b2 = u[1].or_else(is_quad, (u[1] - small).or_else(upper, small));
         let point = xyz(&records[2]).mul_add(b2, xyz(&records[1]).mul_add(b1, xyz(&records[0])));
         let to_light = point - p;
         let distance2 = to_light.dot(to_light);
@@ -206,7 +222,7 @@ impl<L: Lanes> Element<L> {
         let mut uvs = UvSets::single(L::F::zero(), L::F::zero());
         let mut vertex_opacity = L::F::one();
         if triangles.has_attributes() {
-            let attributes = records[1][3].to_bits();
+            let (attributes, b1, b2) = self.half(is_quad, b1, b2);
             if (!attributes.eq(L::U::splat(NONE))).any() {
                 let a = triangles.attributes::<L>(attributes, b1, b2);
                 (uvs, vertex_opacity) = (a.uvs, a.opacity);
@@ -234,6 +250,26 @@ impl<L: Lanes> Element<L> {
             valid: finite & radiance.max_component().gt(L::F::zero()),
             total: L::F::zero(),
         }
+    }
+
+    /// Attributes and barycentric coordinates of points of triangles, and of parallelograms (in `is_quad`) on their halves.
+    #[inline(always)]
+    fn half(&self, is_quad: L::M, b1: L::F, b2: L::F) -> (L::U, L::F, L::F) {
+        let (records, one) = (&self.records, L::F::one());
+        let near = records[1][3].to_bits();
+        if !is_quad.any() {
+            return (near, b1, b2);
+        }
+        let sum = b1 + b2;
+        let is_far = is_quad & one.lt(sum);
+        let attributes = records[2][3].to_bits().or_else(is_far, near);
+        // From the apex; then by the numbers of the corners.
+        let (c1, c2) = ((one - b1).or_else(is_far, b1), (one - b2).or_else(is_far, b2));
+        let c0 = (one - c1) - c2;
+        let both = records[3][0].to_bits();
+        let apex = both.shr(2).or_else(is_far, both & L::U::splat(3));
+        let (first, second) = (is_quad & apex.eq(L::U::splat(1)), is_quad & apex.eq(L::U::splat(2)));
+        (attributes, c0.or_else(first, c2.or_else(second, c1)), c1.or_else(first, c0.or_else(second, c2)))
     }
 
     /// The point, spot and directional lights without size.

@@ -9,6 +9,7 @@ use super::bulb::Bulb;
 use super::choice::{Candidates, Choice, Receiver, Sky, Sun};
 use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
+use super::quad::Quad;
 use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
@@ -31,8 +32,8 @@ pub enum PreparedLight {
         both_sides: bool,
         /// Material index; emission is looked up there.
         material: u32,
-        /// The sphere around it, if it is to be sampled by that.
-        bulb: Option<Bulb>,
+        /// What it is sampled as.
+        shape: LampShape,
     },
     /// A point light, or a spot light about an axis.
     Point {
@@ -56,11 +57,31 @@ pub enum PreparedLight {
     },
 }
 
+/// What a glowing mesh is sampled as.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LampShape {
+    /// Points on its triangles, each as likely.
+    Triangles,
+    /// The same, by one square of numbers.
+    Quad(Quad),
+    /// Directions towards it.
+    Bulb(Bulb),
+}
+
+impl LampShape {
+    /// The shape that connected triangles make; no bulb unless one is allowed.
+    pub fn of(lamps: &[LampTriangle], may_be_bulb: bool) -> Self {
+        let bulb = Bulb::of(lamps).filter(|_| may_be_bulb);
+        let quad = || Quad::of(lamps).map_or(Self::Triangles, Self::Quad);
+        bulb.map_or_else(quad, Self::Bulb)
+    }
+}
+
 impl PreparedLight {
     /// Has a bulb sampled by points on its surface.
     pub fn forget_bulb(&mut self) {
-        if let Self::Mesh { bulb, .. } = self {
-            *bulb = None;
+        if let Self::Mesh { shape: shape @ LampShape::Bulb(_), .. } = self {
+            *shape = LampShape::Triangles;
         }
     }
 }
@@ -148,34 +169,12 @@ impl LightTable {
 
     fn push(&mut self, light: &PreparedLight, triangles: &mut TriangleTable) {
         match light {
-            PreparedLight::Mesh { triangles: lamps, bulb: Some(bulb), .. } => {
+            PreparedLight::Mesh { triangles: lamps, material, shape, .. } => {
                 let number = self.lights.len() as u32;
                 for lamp in lamps {
                     triangles.set_light(lamp.primitive as usize, number);
                 }
-                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
-                self.emissive_meshes += 1;
-                self.emissive_triangles += lamps.len();
-                self.has_bulbs = true;
-            }
-            PreparedLight::Mesh { triangles: lamps, material, bulb: None, .. } => {
-                let number = self.lights.len() as u32;
-                self.has_lamps = true;
-                let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
-                let first_end = self.ends.len();
-                distribution::push_ends(&areas, &mut self.ends);
-                let ends = self.ends.len() - first_end;
-                self.most_ends = self.most_ends.max(ends as u32);
-                let density = 1.0 / areas.iter().sum::<f64>();
-                for (i, lamp) in lamps.iter().enumerate() {
-                    triangles.set_light(lamp.primitive as usize, number);
-                    let records = element::triangle(lamp, *material);
-                    if i == 0 {
-                        self.push_element(first_end as u32, ends as u32, density, records);
-                    } else {
-                        self.elements.extend(records);
-                    }
-                }
+                self.push_lamp(lamps, *material, shape);
                 self.emissive_meshes += 1;
                 self.emissive_triangles += lamps.len();
             }
@@ -196,6 +195,29 @@ impl LightTable {
                 self.has_punctual = true;
             }
         }
+    }
+
+    /// A glowing mesh.
+    fn push_lamp(&mut self, lamps: &[LampTriangle], material: u32, shape: &LampShape) {
+        let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
+        let density = 1.0 / areas.iter().sum::<f64>();
+        match shape {
+            LampShape::Bulb(bulb) => {
+                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
+                self.has_bulbs = true;
+                return;
+            }
+            LampShape::Quad(quad) => self.push_element(0, 0, density, element::quad(quad, lamps[0].ng, material)),
+            LampShape::Triangles => {
+                let first_end = self.ends.len();
+                distribution::push_ends(&areas, &mut self.ends);
+                let ends = self.ends.len() - first_end;
+                self.most_ends = self.most_ends.max(ends as u32);
+                self.push_element(first_end as u32, ends as u32, density, element::triangle(&lamps[0], material));
+                self.elements.extend(lamps[1..].iter().flat_map(|lamp| element::triangle(lamp, material)));
+            }
+        }
+        self.has_lamps = true;
     }
 
     /// A light whose first element has these `records`.
@@ -481,14 +503,14 @@ impl LightTable {
         sources: &Sources<'_>,
     ) -> LightSample<L> {
         if !self.has_bulbs {
-            return element.sample_triangle(&self.elements, p, u, sources);
+            return element.sample_lamp(&self.elements, p, u, sources);
         }
         let bulb = element.sample_bulb(light, p, u);
-        let on_triangle = element.is_triangle();
-        if !self.has_lamps || !on_triangle.any() {
+        let on_lamp = element.is_lamp();
+        if !self.has_lamps || !on_lamp.any() {
             return bulb;
         }
-        merged(on_triangle, element.sample_triangle(&self.elements, p, u, sources), bulb)
+        merged(on_lamp, element.sample_lamp(&self.elements, p, u, sources), bulb)
     }
 }
 

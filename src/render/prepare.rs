@@ -12,11 +12,10 @@ use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables, Spectrum};
-use crate::light::bulb::Bulb;
 use crate::light::element::LampTriangle;
 use crate::light::environment::EnvironmentTable;
 use crate::light::parts::connected;
-use crate::light::table::{LightTable, PreparedLight};
+use crate::light::table::{LampShape, LightTable, PreparedLight};
 use crate::light::{Light, studio};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
@@ -393,8 +392,8 @@ fn flatten(
         for triangles in connected(lamps) {
             let material = mesh.material.0;
             // What is there in part only would have to be asked about twice.
-            let bulb = if lets_rays_pass { None } else { Bulb::of(&triangles) };
-            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material, bulb });
+            let shape = LampShape::of(&triangles, !lets_rays_pass);
+            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material, shape });
         }
         totals.surface.add(mesh_area, material, emission);
     }

@@ -98,7 +98,10 @@ mod tests {
         assert_eq!(lights_that_glass_hides(&scene(glass(0.0, false), 1), false, false), None);
         assert_eq!(lights_that_glass_hides(&scene(glass(0.0, true), 0), false, false), None);
         assert_eq!(lights_that_glass_hides(&scene(Material::default(), 1), false, false), None);
-        assert_eq!(lights_that_glass_hides(&scene(Material { unlit: true, ..glass(0.4, true) }, 1), false, false), None);
+        assert_eq!(
+            lights_that_glass_hides(&scene(Material { unlit: true, ..glass(0.4, true) }, 1), false, false),
+            None
+        );
     }
 
     #[test]

@@ -4,7 +4,9 @@ use super::build::{
     add_box, add_camera, add_floor, add_light, add_mesh, add_quad, add_room, add_triangles, ball, lambert, lamp,
     white_dielectric, white_metal,
 };
-use super::exact::{ball_irradiance, closed_room, corner_form_factor, polygon_irradiance, slab, spot_attenuation, triangles_irradiance};
+use super::exact::{
+    ball_irradiance, closed_room, corner_form_factor, polygon_irradiance, slab, spot_attenuation, triangles_irradiance,
+};
 use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::material::energy::Brdf;
