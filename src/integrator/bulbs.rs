@@ -44,8 +44,10 @@ impl Default for BulbRays {
 /// A shadow ray towards a bulb.
 pub struct BulbRay<L: Lanes> {
     pub origin: V3<L>,
-    /// To behind the bulb.
+    /// Unit.
     pub direction: V3<L>,
+    /// To behind the bulb, metres.
+    pub t_max: L::F,
     /// What arrives of a radiance of 1.
     pub weight: V3<L>,
     /// Number of the light.
@@ -61,14 +63,14 @@ impl BulbRays {
     #[inline(always)]
     pub fn push<L: Lanes>(&mut self, keep: L::M, ray: &BulbRay<L>) {
         let to = self.n;
-        let BulbRay { origin, direction, weight, sought, medium, slot } = *ray;
+        let BulbRay { origin, direction, t_max, weight, sought, medium, slot } = *ray;
         origin.x.compress(keep, &mut self.rays.ox, to);
         origin.y.compress(keep, &mut self.rays.oy, to);
         origin.z.compress(keep, &mut self.rays.oz, to);
         direction.x.compress(keep, &mut self.rays.dx, to);
         direction.y.compress(keep, &mut self.rays.dy, to);
         direction.z.compress(keep, &mut self.rays.dz, to);
-        L::F::one().store(&mut self.rays.t_max, to);
+        t_max.compress(keep, &mut self.rays.t_max, to);
         weight.x.compress(keep, &mut self.weight[0], to);
         weight.y.compress(keep, &mut self.weight[1], to);
         weight.z.compress(keep, &mut self.weight[2], to);
@@ -120,8 +122,7 @@ fn arrive<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, bulbs: &BulbRays,
         return;
     }
     let direction = load3::<L>(&bulbs.rays.dx, &bulbs.rays.dy, &bulbs.rays.dz, at);
-    let length = direction.dot(direction).sqrt();
-    let si = interact::<L>(tables, &bulbs.hits, at, -direction.scale(L::F::one() / length), primitive, hit);
+    let si = interact::<L>(tables, &bulbs.hits, at, -direction, primitive, hit);
     let met = hit & si.triangle.light.eq(L::U::load(&bulbs.sought, at));
     let (radiance, lit) = shining(tables, &si, met);
     if !lit.any() {
@@ -129,7 +130,7 @@ fn arrive<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, bulbs: &BulbRays,
     }
     let mut arriving = load3::<L>(&bulbs.weight[0], &bulbs.weight[1], &bulbs.weight[2], at) * radiance;
     if tables.media.has_volume() {
-        let distance = L::F::load(&bulbs.hits.t, at) * length;
+        let distance = L::F::load(&bulbs.hits.t, at);
         arriving = arriving * tables.media.transmittance(L::U::load(&bulbs.medium, at), distance);
     }
     add_lanes::<L>(pool, L::U::load(&bulbs.slot, at), arriving, lit);

@@ -80,9 +80,10 @@ pub(super) fn queue_light_sample<L: Lanes>(
         sought = cast & !light.sought.eq(L::U::splat(NONE));
         cast = cast & !sought;
         let medium = crossing.map_or(L::U::splat(AIR), |crossing| crossing.medium(through));
+        let (direction, t_max) = (light.wi, light.reach);
         bulbs.push(
             sought,
-            &BulbRay { origin: start, direction: to_light, weight: arriving, sought: light.sought, medium, slot },
+            &BulbRay { origin: start, direction, t_max, weight: arriving, sought: light.sought, medium, slot },
         );
     }
     let direction = light.wi.or_else(light.is_distant, to_light);

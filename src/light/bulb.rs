@@ -11,6 +11,8 @@ use std::f64::consts::PI;
 
 /// Least share of the bounding sphere's outline that a bulb fills on average: 0.76 an icosahedron, 0.64 a cube.
 const LEAST_FILLED: f64 = 0.75;
+/// Triangles of a bulb at most: while it is looked at each takes 200 bytes.
+const MOST: usize = 1 << 16;
 /// Corners may be this far above a neighbour's plane, in radii: what f32 makes of a sphere's small triangles.
 const FLAT: f64 = 1e-5;
 /// By how much the sphere is taken larger, for the rounding of f32.
@@ -28,8 +30,8 @@ pub struct Bulb {
 impl Bulb {
     /// The bulb that connected triangles make, if they make one.
     pub fn of(lamps: &[LampTriangle]) -> Option<Self> {
-        // A tetrahedron, and no more than is looked through at once.
-        if lamps.len() < 4 {
+        // A tetrahedron at least.
+        if !(4..=MOST).contains(&lamps.len()) {
             return None;
         }
         let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);

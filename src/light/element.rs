@@ -56,6 +56,8 @@ pub struct LightSample<L: Lanes> {
     pub end: V3<L>,
     /// Number of the light whose surface the shadow ray is to meet, for its radiance there; [`NONE`] where it is known.
     pub sought: L::U,
+    /// How far away that is at most, metres; [`Self::end`] is then the nearest that it can be.
+    pub reach: L::F,
     /// Lanes whose light is infinitely far.
     pub is_distant: L::M,
     /// Lanes that receive anything.
@@ -246,6 +248,7 @@ impl<L: Lanes> Element<L> {
             is_hidden: L::M::from_bits(0),
             end,
             sought: L::U::splat(NONE),
+            reach: L::F::zero(),
             is_distant: L::M::from_bits(0),
             valid: finite & radiance.max_component().gt(L::F::zero()),
             total: L::F::zero(),
@@ -295,6 +298,7 @@ impl<L: Lanes> Element<L> {
             is_hidden: L::M::first(L::N),
             end: place,
             sought: L::U::splat(NONE),
+            reach: L::F::zero(),
             is_distant,
             valid: radiance.is_finite() & wi.is_finite() & radiance.max_component().gt(zero) & self.pmf.gt(zero),
             total: zero,
@@ -314,6 +318,7 @@ pub fn sample_environment<L: Lanes>(environment: &EnvironmentTable, pmf: L::F, u
         is_hidden: L::M::from_bits(0),
         end: sample.direction,
         sought: L::U::splat(NONE),
+        reach: L::F::zero(),
         is_distant: L::M::first(L::N),
         valid: pdf.is_finite() & pdf.gt(L::F::zero()) & sample.radiance.max_component().gt(L::F::zero()),
         total: L::F::zero(),

@@ -57,19 +57,23 @@ impl<L: Lanes> Element<L> {
     pub fn sample_bulb(&self, light: L::U, p: V3<L>, u: [L::F; 2]) -> LightSample<L> {
         let (one, none) = (L::F::one(), L::M::from_bits(0));
         let v = V3::<L>::of_record(&self.records[0]) - p;
+        let radius2 = self.records[2][2];
         let distance2 = v.dot(v);
         let distance = distance2.sqrt();
-        let cone_pdf = pdf_of_ball(self.records[2][2], distance2);
-        let (wi, _) = in_cone(v.scale(one / distance), depth_of_ball::<L>(self.records[2][2] / distance2), u);
-        let pdf = self.pmf * cone_pdf;
+        let (wi, below) = in_cone(v.scale(one / distance), depth_of_ball::<L>(radius2 / distance2), u);
+        let pdf = self.pmf * pdf_of_ball(radius2, distance2);
+        // Where the sphere ends behind it, and where it begins.
+        let sin2 = below * (L::F::splat(2.0) - below);
+        let far = distance * ((one - below) + safe_sqrt(radius2 / distance2 - sin2));
+        let near = (distance2 - radius2) / far;
         LightSample {
             radiance: V3::splat([1.0; 3]),
             wi,
             pdf,
             is_hidden: none,
-            // Behind it.
-            end: wi.mul_add(distance + self.records[2][2].sqrt(), p),
+            end: wi.mul_add(near, p),
             sought: light,
+            reach: far,
             is_distant: none,
             valid: pdf.gt(L::F::zero()) & pdf.is_finite() & wi.is_finite(),
             total: L::F::zero(),

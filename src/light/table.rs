@@ -524,6 +524,7 @@ fn merged<L: Lanes>(lanes: L::M, a: LightSample<L>, b: LightSample<L>) -> LightS
         is_hidden: (a.is_hidden & lanes) | (b.is_hidden & !lanes),
         end: a.end.or_else(lanes, b.end),
         sought: a.sought.or_else(lanes, b.sought),
+        reach: a.reach.or_else(lanes, b.reach),
         is_distant: (a.is_distant & lanes) | (b.is_distant & !lanes),
         valid: (a.valid & lanes) | (b.valid & !lanes),
         total: a.total.or_else(lanes, b.total),
