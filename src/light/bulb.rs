@@ -15,6 +15,8 @@ const LEAST_FILLED: f64 = 0.75;
 const MOST: usize = 1 << 16;
 /// Corners may be this far above a neighbour's plane, in radii: what f32 makes of a sphere's small triangles.
 const FLAT: f64 = 1e-5;
+/// Corners this near are one, in radii.
+const SEAM: f64 = 1e-5;
 /// By how much the sphere is taken larger, for the rounding of f32.
 const SLACK: f64 = 1e-5;
 
@@ -52,9 +54,10 @@ impl Bulb {
 /// Whether the triangles are the surface of a convex solid around `centre`, fronts outwards: each edge has a triangle on
 /// either side, neither bends inwards there, and seen from the centre they go round it once.
 fn is_convex(lamps: &[LampTriangle], centre: DVec3, radius: f64) -> bool {
-    let place = |corner: Vec3| (corner + Vec3::ZERO).to_array().map(f32::to_bits);
+    // Cells of a grid: what exporters make of a seam or a pole is one corner.
+    let place = |corner: Vec3| ((corner.as_dvec3() - centre) / (SEAM * radius)).round().to_array().map(|v| v as i32);
     // From an edge, walked as its triangle has it, to the corner opposite.
-    let mut opposite: HashMap<[[u32; 3]; 2], Vec3> = HashMap::with_capacity(3 * lamps.len());
+    let mut opposite: HashMap<[[i32; 3]; 2], Vec3> = HashMap::with_capacity(3 * lamps.len());
     let mut solid_angle = 0.0;
     for lamp in lamps {
         let [a, b, c] = lamp.corners.map(|corner| corner.as_dvec3() - centre);
@@ -103,7 +106,6 @@ mod tests {
         let at = |row: usize, column: usize| {
             let (sin, cos) = (std::f32::consts::PI * row as f32 / rows as f32).sin_cos();
             let (s, c) = (std::f32::consts::TAU * (column % columns) as f32 / columns as f32).sin_cos();
-            let sin = if row % rows == 0 { 0.0 } else { sin };
             Vec3::new(0.3 + sin * c, 5.0 + stretch * cos, -2.0 + sin * s)
         };
         let mut triangles = Vec::new();
