@@ -6,6 +6,7 @@ pub mod choice;
 pub mod element;
 pub mod environment;
 pub mod parts;
+pub mod prepared;
 pub mod quad;
 pub mod sized;
 pub mod studio;

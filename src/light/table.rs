@@ -1,15 +1,14 @@
 //! The lights of a scene: choosing one and a point on it, for next event estimation, and the density of that choice.
 //!
 //! A glowing mesh (each part of it that touches no other) is one light, however many triangles it has; of these one is
-//! chosen in proportion to its area. By inverting distribution functions throughout (not by alias tables, which would undo
+//! chosen in proportion to its area, unless they make a parallelogram or a bulb. By inverting distribution functions throughout (not by alias tables, which would undo
 //! the stratification of the numbers).
 
 use super::bounds::Bounds;
-use super::bulb::Bulb;
 use super::choice::{Candidates, Choice, Receiver, Sky, Sun};
 use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
-use super::quad::Quad;
+use super::prepared::{LampShape, PreparedLight};
 use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
@@ -18,73 +17,6 @@ use crate::texture::lookup::TextureTable;
 use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
 use std::ops::Range;
-
-/// A light in the prepared scene's space. Its radiance, intensity or illuminance is above 0 and finite.
-#[derive(Clone, Debug)]
-pub enum PreparedLight {
-    /// A glowing mesh where it is placed, or a part of one.
-    Mesh {
-        /// At least one, of areas whose inverse is in the range of f32.
-        triangles: Vec<LampTriangle>,
-        /// Mean over channels and the surface, nits.
-        radiance: f64,
-        /// Whether it shines on both sides.
-        both_sides: bool,
-        /// Material index; emission is looked up there.
-        material: u32,
-        /// What it is sampled as.
-        shape: LampShape,
-    },
-    /// A point light, or a spot light about an axis.
-    Point {
-        /// Metres.
-        position: glam::Vec3,
-        /// cd per channel.
-        intensity: [f32; 3],
-        /// Unit axis and the cosines of the inner and outer half angles.
-        cone: Option<(glam::Vec3, f32, f32)>,
-        /// Of the ball that it is, metres; 0: none.
-        radius: f64,
-    },
-    /// Parallel light.
-    Directional {
-        /// Unit, towards the light.
-        towards: glam::Vec3,
-        /// lux per channel.
-        illuminance: [f32; 3],
-        /// Half the angle that it is seen at, radians, at most pi/2; 0: none.
-        angular_radius: f64,
-    },
-}
-
-/// What a glowing mesh is sampled as.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LampShape {
-    /// Points on its triangles, each as likely.
-    Triangles,
-    /// The same, by one square of numbers.
-    Quad(Quad),
-    /// Directions towards it.
-    Bulb(Bulb),
-}
-
-impl LampShape {
-    /// The shape that connected triangles make; no bulb unless one is allowed.
-    pub fn of(lamps: &[LampTriangle], may_be_bulb: bool) -> Self {
-        let bulb = Bulb::of(lamps).filter(|_| may_be_bulb);
-        let quad = || Quad::of(lamps).map_or(Self::Triangles, Self::Quad);
-        bulb.map_or_else(quad, Self::Bulb)
-    }
-}
-
-impl PreparedLight {
-    /// Has a bulb sampled by points on its surface.
-    pub fn forget_bulb(&mut self) {
-        if let Self::Mesh { shape: shape @ LampShape::Bulb(_), .. } = self {
-            *shape = LampShape::Triangles;
-        }
-    }
-}
 
 /// What of the scene lights are read from.
 #[derive(Clone, Copy)]
