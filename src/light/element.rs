@@ -4,6 +4,7 @@ use super::bounds::spot_scale;
 use super::bulb::Bulb;
 use super::environment::EnvironmentTable;
 use super::quad::Quad;
+use super::rect::Span;
 use super::table::Sources;
 use crate::math::{UvSets, V3, robust};
 use crate::shape::table::NONE;
@@ -16,7 +17,7 @@ use simd::{Float, Lanes, Mask, Uint};
 /// | 0 | corner, position or direction towards the light | kind |
 /// | 1 | edge 1, or the spot's axis | attributes; of a parallelogram those of its first half |
 /// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | attributes of a parallelogram's second half |
-/// | 3 | intensity or illuminance; which corners of its halves the parallelogram's edges leave: 2 bits each | material |
+/// | 3 | intensity or illuminance; which corners of its halves the parallelogram's edges leave, 2 bits each; one over their lengths in a rectangle, else 0 | material |
 /// | 4 | unit normal | offset length |
 pub const RECORDS: u32 = 5;
 const TRIANGLE: u32 = 0;
@@ -103,11 +104,12 @@ fn offset_length(corners: &[glam::Vec3], ng: glam::Vec3) -> f32 {
 pub fn quad(quad: &Quad, ng: glam::Vec3, material: u32) -> [[f32; 4]; RECORDS as usize] {
     let Quad { v0, e1, e2, attributes: [near, far], apex: [i, k] } = *quad;
     let offset = offset_length(&[v0, v0 + e1, v0 + e2, v0 + e1 + e2], ng);
+    let inverse = quad.inverse_lengths();
     [
         record(v0, QUAD),
         record(e1, near),
         record(e2, far),
-        [f32::from_bits(i | k << 2), 0.0, 0.0, f32::from_bits(material)],
+        [f32::from_bits(i | k << 2), inverse[0], inverse[1], f32::from_bits(material)],
         record(ng, offset.to_bits()),
     ]
 }
@@ -196,9 +198,28 @@ impl<L: Lanes> Element<L> {
         self.is_lamp() | self.records[0][3].to_bits().eq(L::U::splat(BULB))
     }
 
-    /// A point on the triangles and parallelograms, each as likely, as seen from `p`.
+    /// The rectangles as seen from `p`, and the lanes that sample them by solid angle.
     #[inline(always)]
-    pub fn sample_lamp(&self, elements: &[[f32; 4]], p: V3<L>, u: [L::F; 2], sources: &Sources<'_>) -> LightSample<L> {
+    pub fn span(&self, elements: &[[f32; 4]], p: V3<L>) -> (Span<L>, L::M) {
+        let (records, xyz) = (&self.records, V3::<L>::of_record);
+        let normal = self.normal.records(elements);
+        let inverse = [records[3][1], records[3][2]];
+        let span = Span::new(p, xyz(&records[0]), [xyz(&records[1]), xyz(&records[2])], xyz(&normal), inverse);
+        let by_angle = self.is_quad() & inverse[0].gt(L::F::zero()) & span.is_large();
+        (span, by_angle)
+    }
+
+    /// A point on the triangles and parallelograms, as seen from `p`: each as likely, on rectangles each direction if some
+    /// element is one.
+    #[inline(always)]
+    pub fn sample_lamp(
+        &self,
+        elements: &[[f32; 4]],
+        p: V3<L>,
+        u: [L::F; 2],
+        sources: &Sources<'_>,
+        has_rectangles: bool,
+    ) -> LightSample<L> {
         let Self { records, pmf, density, .. } = self;
         let Sources { triangles, materials, textures } = *sources;
         let normal = self.normal.records(elements);
@@ -209,15 +230,26 @@ impl<L: Lanes> Element<L> {
         let upper = u[1].gt(u[0]);
         let small = u[0].min(u[1]) * half;
         let is_quad = self.is_quad();
-        let b1 = u[0].or_else(is_quad, small.or_else(upper, u[0] - small));
-        let b2 = u[1].or_else(is_quad, (u[1] - small).or_else(upper, small));
+        let mut b1 = u[0].or_else(is_quad, small.or_else(upper, u[0] - small));
+        let mut b2 = u[1].or_else(is_quad, (u[1] - small).or_else(upper, small));
+        let mut rectangle = None;
+        if has_rectangles {
+            let (span, by_angle) = self.span(elements, p);
+            let [s, t] = span.sample(u);
+            (b1, b2) = (s.or_else(by_angle, b1), t.or_else(by_angle, b2));
+            rectangle = Some((span.pdf(), by_angle));
+        }
         let point = xyz(&records[2]).mul_add(b2, xyz(&records[1]).mul_add(b1, xyz(&records[0])));
         let to_light = point - p;
         let distance2 = to_light.dot(to_light);
         let wi = to_light.scale(L::F::one() / distance2.sqrt());
         let cos = -wi.dot(ng);
         let front = cos.gt(L::F::zero());
-        let pdf = *pmf * *density * distance2 / cos.abs();
+        let mut pdf = *density * distance2 / cos.abs();
+        if let Some((own, by_angle)) = rectangle {
+            pdf = own.or_else(by_angle, pdf);
+        }
+        let pdf = *pmf * pdf;
         // Off the light's surface, on the side that is seen.
         let side = L::F::one().or_else(front, -L::F::one());
         let end = robust::offset_point(point, ng.scale(side), normal[3]);
@@ -230,7 +262,7 @@ impl<L: Lanes> Element<L> {
                 (uvs, vertex_opacity) = (a.uvs, a.opacity);
             }
         }
-        let finite = pdf.is_finite() & pdf.gt(L::F::zero());
+        let finite = pdf.is_finite() & pdf.gt(L::F::zero()) & distance2.gt(L::F::zero());
         let material = records[3][3].to_bits();
         let mut radiance: V3<L> = materials.emission(textures, material, front, &uvs, finite);
         if materials.has_coat() {

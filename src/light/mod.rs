@@ -8,6 +8,7 @@ pub mod environment;
 pub mod parts;
 pub mod prepared;
 pub mod quad;
+pub mod rect;
 pub mod sized;
 pub mod studio;
 pub mod table;

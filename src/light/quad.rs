@@ -8,6 +8,9 @@ const OFF: f32 = 1e-4;
 /// And by this share of the largest coordinate, so that no point of it is behind the triangles by what rays keep off them.
 const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
+/// Cosine between edges that are at right angles.
+const SQUARE: f32 = 1e-5;
+
 /// A parallelogram with the corner `v0`, from which its edges go to either end of the diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quad {
@@ -24,6 +27,14 @@ pub struct Quad {
 }
 
 impl Quad {
+    /// One over the lengths of the edges where they are at right angles; else 0, as in `element.rs`.
+    pub fn inverse_lengths(&self) -> [f32; 2] {
+        let (l1, l2) = (self.e1.length(), self.e2.length());
+        let inverse = [1.0 / l1, 1.0 / l2];
+        let is_rectangle = self.e1.dot(self.e2).abs() <= SQUARE * l1 * l2 && inverse.iter().all(|i| i.is_normal());
+        if is_rectangle { inverse } else { [0.0; 2] }
+    }
+
     /// The parallelogram that connected triangles make, if they make one.
     pub fn of(lamps: &[LampTriangle]) -> Option<Self> {
         let [near, far] = lamps else { return None };
@@ -87,5 +98,9 @@ mod tests {
             assert_eq!(Quad::of(&lamps([[a, b, c], far])), None, "{name}");
         }
         assert_eq!(Quad::of(&lamps([[a, b, c], [d, c, b]])[..1]), None);
+        let square = Quad::of(&lamps([[a, b, c], [d, c, b]])).expect("a square");
+        assert_eq!(square.inverse_lengths(), [1.0; 2]);
+        let leaning = Quad { e2: Vec3::new(1e-4, 1.0, 0.0), ..square };
+        assert_eq!(leaning.inverse_lengths(), [0.0; 2]);
     }
 }

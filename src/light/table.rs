@@ -48,6 +48,8 @@ pub struct LightTable {
     emissive_triangles: usize,
     /// Surfaces that are sampled by points on them.
     has_lamps: bool,
+    /// Some of them by the solid angle that they fill.
+    has_rectangles: bool,
     has_bulbs: bool,
     has_punctual: bool,
     /// Some of them have a size.
@@ -139,7 +141,10 @@ impl LightTable {
                 self.has_bulbs = true;
                 return;
             }
-            LampShape::Quad(quad) => self.push_element(0, 0, density, element::quad(quad, lamps[0].ng, material)),
+            LampShape::Quad(quad) => {
+                self.push_element(0, 0, density, element::quad(quad, lamps[0].ng, material));
+                self.has_rectangles |= quad.inverse_lengths()[0] > 0.0;
+            }
             LampShape::Triangles => {
                 let first_end = self.ends.len();
                 distribution::push_ends(&areas, &mut self.ends);
@@ -261,13 +266,21 @@ impl LightTable {
     #[inline(always)]
     pub fn density<L: Lanes>(&self, light: L::U, at: V3<L>, wo: V3<L>, distance: L::F, cos: L::F) -> L::F {
         let record = light.records(&self.lights);
-        let density = record[3] * distance * distance / cos;
-        if !self.has_bulbs {
+        let mut density = record[3] * distance * distance / cos;
+        if !self.has_bulbs && !self.has_rectangles {
             return density;
         }
         let is_bulb = record[3].lt(L::F::zero());
         let element = Element::<L>::load(&self.elements, record[0].to_bits(), L::F::one(), L::F::one());
-        element.pdf_of_bulb(wo.mul_add(distance, at)).or_else(is_bulb, density)
+        let from = wo.mul_add(distance, at);
+        if self.has_rectangles {
+            let (span, by_angle) = element.span(&self.elements, from);
+            density = span.pdf().or_else(by_angle, density);
+        }
+        if self.has_bulbs {
+            density = element.pdf_of_bulb(from).or_else(is_bulb, density);
+        }
+        density
     }
 
     /// Some lights are sampled by rays that look for them, see [`LightSample::sought`].
@@ -435,14 +448,14 @@ impl LightTable {
         sources: &Sources<'_>,
     ) -> LightSample<L> {
         if !self.has_bulbs {
-            return element.sample_lamp(&self.elements, p, u, sources);
+            return element.sample_lamp(&self.elements, p, u, sources, self.has_rectangles);
         }
         let bulb = element.sample_bulb(light, p, u);
         let on_lamp = element.is_lamp();
         if !self.has_lamps || !on_lamp.any() {
             return bulb;
         }
-        merged(on_lamp, element.sample_lamp(&self.elements, p, u, sources), bulb)
+        merged(on_lamp, element.sample_lamp(&self.elements, p, u, sources, self.has_rectangles), bulb)
     }
 }
 
