@@ -33,9 +33,9 @@ pub struct Span<L: Lanes> {
 fn acos<F: Float>(c: F) -> F {
     let f = |v: f32| F::splat(v);
     let a = c.abs();
-    let p = f(-0.001_262_491_1).mul_add(a, f(0.006_670_090_1)).mul_add(a, f(-0.017_088_126));
+    let p = f(-0.001_262_491_1).mul_add(a, f(0.006_670_09)).mul_add(a, f(-0.017_088_126));
     let p = p.mul_add(a, f(0.030_891_88)).mul_add(a, f(-0.050_174_303)).mul_add(a, f(0.088_978_99));
-    let p = p.mul_add(a, f(-0.214_598_8)).mul_add(a, f(1.570_796_3));
+    let p = p.mul_add(a, f(-0.214_598_8)).mul_add(a, f(std::f32::consts::FRAC_PI_2));
     let acute = p * safe_sqrt(F::one() - a);
     acute.or_else(c.ge(F::zero()), f(PI) - acute)
 }
