@@ -1,4 +1,5 @@
-//! `--env` as users meet it: what it lights and shows, its direction, and what is said where it is none.
+//! `--env`, `--light-radius` and `--sun-angle` as users meet them: what they light and show, and what is said where a
+//! value is none.
 
 use prt::image::exr_read::{Picture, read};
 use serde_json::{Value, json};
@@ -116,4 +117,51 @@ fn what_is_not_as_it_should_be_is_warned_of_and_what_is_none_is_a_usage_error() 
         assert!(says.iter().all(|part| text.contains(part)), "{args:?}: {text}");
         assert!(!root.path().join("renders").exists());
     }
+}
+
+/// The same scene under a point light and a sun, which the camera does not see; it looks at the triangle from the front.
+fn lit() -> String {
+    let mut scene: Value = serde_json::from_str(&scene()).unwrap();
+    scene["nodes"][0]["translation"] = json!([0.0, 0.0, -5.0]);
+    scene["cameras"][0]["perspective"]["yfov"] = json!(0.001);
+    scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    scene["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "point", "intensity": 40.0 }, { "type": "directional", "intensity": 2.0 }
+    ] } });
+    for light in 0..2 {
+        let node = json!({ "extensions": { "KHR_lights_punctual": { "light": light } } });
+        scene["nodes"].as_array_mut().unwrap().push(node);
+        // After the triangle's and the camera's.
+        scene["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(2 + light));
+    }
+    scene.to_string()
+}
+
+#[test]
+fn lights_get_a_size_that_is_recorded_and_what_sees_all_of_them_stays_as_bright() {
+    let root = tempfile::tempdir().expect("a temporary folder");
+    fs::write(root.path().join("a.gltf"), lit()).unwrap();
+    let mean = |picture: &Picture| {
+        let sum: f64 = picture.pixels.iter().flatten().map(|c| f64::from(*c)).sum();
+        sum / (3 * picture.pixels.len()) as f64
+    };
+    let (small, report) = rendered(root.path(), &[]);
+    assert!(report["fingerprint"]["settings"]["light-radius"].is_null() && mean(&small) > 0.0);
+    let sized = ["--light-radius", "0.5", "--sun-angle", "20"];
+    let (large, report) = rendered(root.path(), &sized);
+    assert_eq!(report["fingerprint"]["settings"]["light-radius"], "0.5");
+    assert_eq!(report["fingerprint"]["settings"]["sun-angle"], "20");
+    // Few samples, and a highlight that is spread; `verify light` has the exact values.
+    assert!((mean(&large) / mean(&small) - 1.0).abs() < 0.03, "{} and {}", mean(&large), mean(&small));
+    assert!(large != small);
+    let meta = exr::meta::MetaData::read_from_file(root.path().join("renders/a.exr"), false).unwrap();
+    for name in ["prt:lightRadius", "prt:sunAngle"] {
+        assert!(meta.headers[0].own_attributes.other.iter().any(|(other, _)| *other == *name), "{name}");
+    }
+    fs::write(root.path().join("sizes.toml"), "light-radius = 0.5\nsun-angle = 20\n").unwrap();
+    let from_config = rendered(root.path(), &["--config", "sizes.toml"]);
+    assert_eq!(from_config.1["status"], "up-to-date", "the same options");
+    // None again is what there was before.
+    let (none, _) = rendered(root.path(), &["--light-radius", "0", "--sun-angle", "0"]);
+    assert_eq!(none, small);
 }

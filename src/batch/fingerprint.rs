@@ -213,6 +213,8 @@ impl Wanted<'_> {
             filter,
             brdf,
             default_light,
+            light_radius,
+            sun_angle,
             // As asked for: which backend `auto` takes is known only when the scene is prepared, and their pictures
             // differ by rounding alone.
             accel,
@@ -229,9 +231,14 @@ impl Wanted<'_> {
         set("seed", seed.to_string());
         set("frame", frame.to_string());
         set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
-        // Named only where it is on: pictures without it have the fingerprints that they had before there was one.
+        // Named only where they are on: pictures without them have the fingerprints that they had before there were any.
         if *texture_lod {
             set("texture-lod", "on".into());
+        }
+        for (name, size) in [("light-radius", light_radius), ("sun-angle", sun_angle)] {
+            if *size > 0.0 {
+                set(name, size.to_string());
+            }
         }
         set("cull-backfaces", if *cull_backfaces { "on" } else { "off" }.into());
         let Filter { shape, width } = filter;

@@ -104,6 +104,11 @@ fn attributes(
     if settings.texture_lod {
         attributes.push(("prt:textureLod", ExrValue::Text("cones".into())));
     }
+    for (name, size) in [("prt:lightRadius", settings.light_radius), ("prt:sunAngle", settings.sun_angle)] {
+        if size > 0.0 {
+            attributes.push((name, ExrValue::Double(size)));
+        }
+    }
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
     }
@@ -217,6 +222,9 @@ mod tests {
         assert_eq!(bias_of(&frame, &settings, None), named);
         assert!(attributes(&frame, &settings, None, None).iter().any(|a| a.0 == "prt:textureLod"));
         settings.texture_lod = false;
+        settings.sun_angle = 0.5;
+        assert_eq!(bias_of(&frame, &settings, None), "no", "another scene, not a bias");
+        assert!(attributes(&frame, &settings, None, None).iter().any(|a| a.0 == "prt:sunAngle"));
         settings.max_bounces = Some(3);
         frame.stats.non_finite_samples = 7;
         assert_eq!(

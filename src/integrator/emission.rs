@@ -24,6 +24,19 @@ pub(super) fn emitted<L: Lanes>(
     L::outline(Emitted { tables, si, from, at, distance, prev_pdf, hit })
 }
 
+/// Radiance that the surfaces of `hit` send back along the ray, and the lanes that have any.
+#[inline(always)]
+pub(super) fn shining<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, hit: L::M) -> (V3<L>, L::M) {
+    let (materials, material) = (&tables.materials, si.triangle.material);
+    let le: V3<L> = materials.emission(&tables.textures, material, si.front, &si.uvs, hit);
+    let lit = hit & le.max_component().gt(L::F::zero());
+    if !materials.has_coat() || !lit.any() {
+        return (le, lit);
+    }
+    let cos = si.wo.dot(si.ng);
+    (le.scale(materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, lit)), lit)
+}
+
 /// [`emitted`].
 struct Emitted<'a, L: Lanes> {
     tables: &'a SceneTables,
@@ -41,15 +54,9 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
     #[inline(always)]
     fn run(self) -> (V3<L>, L::M) {
         let Self { tables, si, from, at, distance, prev_pdf, hit } = self;
-        let (materials, material) = (&tables.materials, si.triangle.material);
-        let mut le: V3<L> = materials.emission(&tables.textures, material, si.front, &si.uvs, hit);
-        let lit = hit & le.max_component().gt(L::F::zero());
+        let (le, lit) = shining(tables, si, hit);
         if !lit.any() {
             return (le, lit);
-        }
-        if materials.has_coat() {
-            let cos = si.wo.dot(si.ng);
-            le = le.scale(materials.emission_through_coat::<L>(&tables.textures, material, cos, &si.uvs, lit));
         }
         // Weighed against having sampled the same point as a light. The ray that found it came straight from the last
         // scattering; only camera rays may have passed a culled surface.
@@ -59,7 +66,8 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
         if !sampled.any() {
             return (le, lit);
         }
-        let density = tables.lights.density::<L>(light) * distance * distance / si.wo.dot(si.triangle.ng).abs();
+        let cos = si.wo.dot(si.triangle.ng).abs();
+        let density = tables.lights.density(light, si.p, si.wo, distance, cos);
         let pmf = tables.lights.pmf::<L>(light, receiver::load(tables, from, at));
         let other: L::F = (pmf * density).masked(sampled);
         (le.scale(weight_of_remembered::<L>(prev_pdf, other)), lit)

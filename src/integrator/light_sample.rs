@@ -1,6 +1,7 @@
 //! Next event estimation: a light, a point on it, and a shadow ray on the side where that is.
 
 use super::SceneTables;
+use super::bulbs::BulbRay;
 use super::closure::Closure;
 use super::interaction::Interaction;
 use super::medium::Crossing;
@@ -8,8 +9,10 @@ use super::pool::PathPool;
 use super::shade::add_lanes;
 use super::weight::weight;
 use crate::light::choice::Receiver;
+use crate::material::media::AIR;
 use crate::math::V3;
-use simd::{Float, Lanes, Mask};
+use crate::shape::table::NONE;
+use simd::{Float, Lanes, Mask, Uint};
 
 /// A vertex of N paths.
 pub(super) struct Vertex<'a, L: Lanes> {
@@ -27,8 +30,18 @@ pub(super) struct Vertex<'a, L: Lanes> {
     pub slot: L::U,
 }
 
-/// Queues a shadow ray with its finished contribution for a light chosen by `u`; the lanes of `scatters` that have one, and
-/// the sums of importances that the choice was made by.
+/// What was queued.
+pub(super) struct Queued<L: Lanes> {
+    /// Lanes that have a shadow ray whose contribution is known.
+    pub cast: L::M,
+    /// Lanes that have one towards a bulb.
+    pub sought: L::M,
+    /// The sums of importances that the choice was made by.
+    pub total: L::F,
+}
+
+/// Queues a shadow ray for a light chosen by `u` in the lanes of `scatters` that get any light, with its finished
+/// contribution where that is known.
 #[inline(always)]
 pub(super) fn queue_light_sample<L: Lanes>(
     tables: &SceneTables,
@@ -36,12 +49,12 @@ pub(super) fn queue_light_sample<L: Lanes>(
     vertex: &Vertex<'_, L>,
     u: [L::F; 4],
     scatters: L::M,
-) -> (L::M, L::F) {
+) -> Queued<L> {
     let Vertex { si, closure, crossing, receiver, start, beta, slot } = *vertex;
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
-    let weight = one.or_else(light.is_delta, weight::<L>(light.pdf, value.pdf, !closure.bsdf.is_glossy()));
+    let weight = one.or_else(light.is_hidden, weight::<L>(light.pdf, value.pdf, !closure.bsdf.is_glossy()));
     let mut arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
     let (through, proper) = closure.sides(tables, si, light.wi);
     let sees = scatters & light.valid & proper;
@@ -55,12 +68,26 @@ pub(super) fn queue_light_sample<L: Lanes>(
     }
     let to_light = light.end - start;
     if let Some(crossing) = crossing {
-        arriving =
-            crossing.colored(arriving, through) * crossing.on_the_way(tables, light.is_distant, to_light, through);
+        arriving = crossing.colored(arriving, through);
+        let passed = arriving * crossing.on_the_way(tables, light.is_distant, to_light, through);
+        // How far a bulb is is not known yet.
+        let known = light.sought.eq(L::U::splat(NONE));
+        arriving = passed.or_else(known, arriving);
     }
-    let cast = sees & !broken & arriving.max_component().gt(zero);
+    let mut cast = sees & !broken & arriving.max_component().gt(zero);
+    let mut sought = L::M::from_bits(0);
+    if let Some(bulbs) = &mut pool.bulbs {
+        sought = cast & !light.sought.eq(L::U::splat(NONE));
+        cast = cast & !sought;
+        let medium = crossing.map_or(L::U::splat(AIR), |crossing| crossing.medium(through));
+        let (direction, t_max) = (light.wi, light.reach);
+        bulbs.push(
+            sought,
+            &BulbRay { origin: start, direction, t_max, weight: arriving, sought: light.sought, medium, slot },
+        );
+    }
     let direction = light.wi.or_else(light.is_distant, to_light);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
     pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);
-    (cast, light.total)
+    Queued { cast, sought, total: light.total }
 }

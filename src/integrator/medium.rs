@@ -138,9 +138,15 @@ impl<L: Lanes> Crossing<L> {
     /// shadow rays, so it is one medium all the way.
     #[inline(always)]
     pub fn on_the_way(&self, tables: &SceneTables, is_distant: L::M, to_light: V3<L>, through: L::M) -> V3<L> {
-        let medium = self.behind.or_else(through, self.before);
+        let medium = self.medium(through);
         let near: V3<L> = tables.media.transmittance(medium, to_light.dot(to_light).sqrt());
         tables.media.transmittance_from_far(medium).or_else(is_distant, near)
+    }
+
+    /// The medium that a ray goes through that leaves behind the surface in `through`, else before it.
+    #[inline(always)]
+    pub fn medium(&self, through: L::M) -> L::U {
+        self.behind.or_else(through, self.before)
     }
 
     /// By how much radiance is denser than in air where the path goes on: behind the surface in `through`.

@@ -3,6 +3,7 @@
 //! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
+mod bulbs;
 mod closure;
 mod cone;
 mod coverage;
@@ -16,6 +17,7 @@ mod normals;
 mod pool;
 mod receiver;
 mod shade;
+mod sized;
 mod terminator;
 mod through;
 mod wave;

@@ -1,6 +1,7 @@
 //! The state of a worker's paths, structure of arrays, small enough for the L2 cache.
 
 use super::SceneTables;
+use super::bulbs::BulbRays;
 use super::medium::DEPTH;
 use super::receiver::{self, Remembered};
 use super::through::Glass;
@@ -49,6 +50,8 @@ pub struct PathPool {
     pub cone_spread: Buffer<f32>,
     /// What shadow rays through thin glass need; `None` where there is none.
     pub glass: Option<Box<Glass>>,
+    /// Shadow rays towards bulbs; `None` where there are none.
+    pub bulbs: Option<Box<BulbRays>>,
     /// From where its last light was chosen (`receiver.rs`).
     pub from: Remembered,
     /// What choosing a light needs.
@@ -101,6 +104,7 @@ impl PathPool {
             cone_width: Buffer::new(0),
             cone_spread: Buffer::new(0),
             glass: None,
+            bulbs: None,
             from: std::array::from_fn(|_| Buffer::new(0)),
             light_scratch: Buffer::new(0),
             slot: ints(),
@@ -129,6 +133,9 @@ impl PathPool {
         if media.has_thin_glass() && self.glass.is_none() {
             (self.travelled, self.passes) = (Buffer::new(ROOM), Buffer::new(ROOM));
             self.glass = Some(Box::default());
+        }
+        if tables.lights.has_bulbs() && self.bulbs.is_none() {
+            self.bulbs = Some(Box::default());
         }
         if tables.textures.has_levels() && self.cone_width.is_empty() {
             (self.cone_width, self.cone_spread) = (Buffer::new(ROOM), Buffer::new(ROOM));

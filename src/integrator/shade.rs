@@ -10,6 +10,7 @@ use super::medium::{Crossing, Stack};
 use super::miss::see_environment;
 use super::pool::PathPool;
 use super::receiver::{self, receiver};
+use super::sized::{see_balls, see_suns};
 use super::wave::Counters;
 use super::weight::remembered;
 use crate::accel::MISS;
@@ -61,6 +62,12 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let mut hit = active & !primitive.eq(L::U::splat(MISS));
     if tables.lights.has_environment() {
         see_environment::<L>(tables, pool, at, slot, active & !hit);
+    }
+    if !tables.lights.balls().is_empty() {
+        see_balls::<L>(tables, pool, at, slot, active, hit);
+    }
+    if !tables.lights.suns().is_empty() {
+        see_suns::<L>(tables, pool, at, slot, active & !hit);
     }
     if tables.media.has_volume() {
         let inside = !Stack::<L>::load(&pool.media, at).innermost().eq(L::U::splat(AIR));
@@ -142,13 +149,17 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let mut expected = L::F::zero();
     if !tables.lights.is_empty() {
         let u = key.group(vertex + vertex + L::U::splat(dims::FIRST_LIGHT));
-        let to = pool.n_shadow;
+        let (to, to_bulbs) = (pool.n_shadow, pool.bulbs.as_ref().map_or(0, |bulbs| bulbs.n));
         let (closure, crossing) = (&closure, crossing.as_ref());
         let here = Vertex { si: &si, closure, crossing, receiver: &receiver, start, beta, slot };
-        let (cast, total) = queue_light_sample::<L>(tables, pool, &here, u, scatters);
-        expected = total;
+        let queued = queue_light_sample::<L>(tables, pool, &here, u, scatters);
+        expected = queued.total;
         if tables.materials.has_alpha() {
-            coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1)).compress(cast, &mut pool.shadow.key, to);
+            let key = coverage_key::<L>(key.pixel, key.sample, depth + L::U::splat(1));
+            key.compress(queued.cast, &mut pool.shadow.key, to);
+            if let Some(bulbs) = &mut pool.bulbs {
+                key.compress(queued.sought, &mut bulbs.rays.key, to_bulbs);
+            }
         }
     }
 

@@ -101,6 +101,7 @@ impl PathTracer<'_> {
             dispatch_large(self.level, Shade { tracer: self, pool, counters });
 
             self.shadow(pool, counters);
+            self.light_of_bulbs(pool, counters);
             for i in 0..pool.n_dead {
                 let slot = pool.dead[i];
                 let radiance = std::mem::take(&mut pool.radiance[slot as usize]);

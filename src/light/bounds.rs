@@ -31,6 +31,8 @@ pub struct Bounds {
     falloff: [f64; 2],
     /// Irradiance on what it surrounds, `pi x radiance`; 0 where it cannot surround anything or is several lights.
     exitance: f64,
+    /// Metres, of a ball; 0 of what is not one.
+    ball: f64,
 }
 
 impl Bounds {
@@ -46,6 +48,7 @@ impl Bounds {
             strength: 0.0,
             falloff: [0.0, 1.0],
             exitance: PI * radiance,
+            ball: 0.0,
         };
         let mut sum = DVec3::ZERO;
         for corners in triangles {
@@ -84,6 +87,7 @@ impl Bounds {
             // The cosine is 1 everywhere.
             falloff: [-2.0, 1.0],
             exitance: 0.0,
+            ball: 0.0,
         }
     }
 
@@ -91,6 +95,11 @@ impl Bounds {
     pub fn of_spot(position: DVec3, intensity: f64, axis: DVec3, inner: f64, outer: f64) -> Self {
         let falloff = [outer, spot_scale(inner, outer)];
         Self { axis, cos_cone: 1.0, falloff, ..Self::of_point(position, intensity) }
+    }
+
+    /// A point or spot light that is a ball of `radius` metres.
+    pub fn with_radius(self, radius: f64) -> Self {
+        Self { low: self.low - radius, high: self.high + radius, ball: radius, ..self }
     }
 
     /// Both.
@@ -106,6 +115,7 @@ impl Bounds {
             strength: self.strength + other.strength,
             falloff: [self.falloff[0].min(other.falloff[0]), self.falloff[1].max(other.falloff[1])],
             exitance: 0.0,
+            ball: 0.0,
         }
     }
 
@@ -114,9 +124,9 @@ impl Bounds {
         0.5 * (self.low + self.high)
     }
 
-    /// From the centre to a corner, metres.
+    /// From the centre to the furthest point, metres: to a corner, but of a ball.
     pub fn radius(&self) -> f64 {
-        0.5 * (self.high - self.low).length()
+        if self.ball > 0.0 { self.ball } else { 0.5 * (self.high - self.low).length() }
     }
 
     /// Corners of the box.

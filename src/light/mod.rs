@@ -1,10 +1,15 @@
 //! Punctual lights (`KHR_lights_punctual`) and environments. Emissive surfaces are materials.
 
 pub mod bounds;
+pub mod bulb;
 pub mod choice;
 pub mod element;
 pub mod environment;
 pub mod parts;
+pub mod prepared;
+pub mod quad;
+pub mod rect;
+pub mod sized;
 pub mod studio;
 pub mod table;
 

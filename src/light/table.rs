@@ -1,51 +1,22 @@
 //! The lights of a scene: choosing one and a point on it, for next event estimation, and the density of that choice.
 //!
 //! A glowing mesh (each part of it that touches no other) is one light, however many triangles it has; of these one is
-//! chosen in proportion to its area. By inverting distribution functions throughout (not by alias tables, which would undo
+//! chosen in proportion to its area, unless they make a parallelogram or a bulb. By inverting distribution functions throughout (not by alias tables, which would undo
 //! the stratification of the numbers).
 
 use super::bounds::Bounds;
-use super::choice::{Candidates, Choice, Receiver, Sky};
+use super::choice::{Candidates, Choice, Receiver, Sky, Sun};
 use super::element::{self, Element, LampTriangle, LightSample, sample_environment};
 use super::environment::EnvironmentTable;
+use super::prepared::{LampShape, PreparedLight};
+use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
-use crate::shape::table::{NONE, TriangleTable};
+use crate::shape::table::TriangleTable;
 use crate::texture::lookup::TextureTable;
 use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
-
-/// A light in the prepared scene's space. Its radiance, intensity or illuminance is above 0 and finite.
-#[derive(Clone, Debug)]
-pub enum PreparedLight {
-    /// A glowing mesh where it is placed, or a part of one.
-    Mesh {
-        /// At least one, of areas whose inverse is in the range of f32.
-        triangles: Vec<LampTriangle>,
-        /// Mean over channels and the surface, nits.
-        radiance: f64,
-        /// Whether it shines on both sides.
-        both_sides: bool,
-        /// Material index; emission is looked up there.
-        material: u32,
-    },
-    /// A point light, or a spot light about an axis.
-    Point {
-        /// Metres.
-        position: glam::Vec3,
-        /// cd per channel.
-        intensity: [f32; 3],
-        /// Unit axis and the cosines of the inner and outer half angles.
-        cone: Option<(glam::Vec3, f32, f32)>,
-    },
-    /// Parallel light.
-    Directional {
-        /// Unit, towards the light.
-        towards: glam::Vec3,
-        /// lux per channel.
-        illuminance: [f32; 3],
-    },
-}
+use std::ops::Range;
 
 /// What of the scene lights are read from.
 #[derive(Clone, Copy)]
@@ -58,13 +29,16 @@ pub struct Sources<'a> {
     pub textures: &'a TextureTable,
 }
 
+/// In place of a density.
+const IS_BULB: f64 = -1.0;
+
 /// The lights of a scene, in the order of their numbers: those with a place, then suns, then the environment.
 #[derive(Clone, Debug, Default)]
 pub struct LightTable {
     /// [`element::RECORDS`] each, those of a light together.
     elements: Vec<[f32; 4]>,
     /// A light's first element, the first of its `ends`, how many these are, and the density of a point on it given that
-    /// it is chosen, 1/m^2.
+    /// it is chosen, 1/m^2, or [`IS_BULB`].
     lights: Vec<[f32; 4]>,
     /// Upper ends of the triangles' shares of their light, a table a mesh.
     ends: Vec<f32>,
@@ -72,7 +46,17 @@ pub struct LightTable {
     most_ends: u32,
     emissive_meshes: usize,
     emissive_triangles: usize,
+    /// Surfaces that are sampled by points on them.
+    has_lamps: bool,
+    /// Some of them by the solid angle that they fill.
+    has_rectangles: bool,
+    has_bulbs: bool,
     has_punctual: bool,
+    /// Some of them have a size.
+    has_sized: bool,
+    /// Numbers of the lights with a size that scattered rays find.
+    balls: Range<u32>,
+    suns: Range<u32>,
     environment: Option<EnvironmentTable>,
     samples_environment: bool,
     /// How one is chosen; `None` for a single light.
@@ -87,11 +71,11 @@ impl LightTable {
         radius: f64,
         triangles: &mut TriangleTable,
     ) -> Self {
-        // Stable: surfaces, points, suns.
+        // Stable: surfaces, balls, points, suns.
         lights.sort_by_key(|light| match light {
             PreparedLight::Mesh { .. } => 0,
-            PreparedLight::Point { .. } => 1,
-            PreparedLight::Directional { .. } => 2,
+            PreparedLight::Point { radius, .. } => 1 + u8::from(*radius <= 0.0),
+            PreparedLight::Directional { .. } => 3,
         });
         let mut table = Self::default();
         // An environment that is the same all around is left to scattered rays, which find it wherever they go.
@@ -111,40 +95,66 @@ impl LightTable {
             table.push_element(0, 0, 0.0, element::environment());
         }
         table.environment = environment;
+        if table.choice.as_ref().is_some_and(|choice| !choice.finds_balls()) {
+            table.balls = 0..0;
+        }
         table
     }
 
     fn push(&mut self, light: &PreparedLight, triangles: &mut TriangleTable) {
         match light {
-            PreparedLight::Mesh { triangles: lamps, material, .. } => {
+            PreparedLight::Mesh { triangles: lamps, material, shape, .. } => {
                 let number = self.lights.len() as u32;
-                let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
+                for lamp in lamps {
+                    triangles.set_light(lamp.primitive as usize, number);
+                }
+                self.push_lamp(lamps, *material, shape);
+                self.emissive_meshes += 1;
+                self.emissive_triangles += lamps.len();
+            }
+            &PreparedLight::Point { position, intensity, cone, radius } => {
+                if radius > 0.0 {
+                    extend(&mut self.balls, self.lights.len() as u32);
+                    self.has_sized = true;
+                }
+                self.push_element(0, 0, 0.0, element::point(position, intensity, cone, radius));
+                self.has_punctual = true;
+            }
+            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
+                if angular_radius > 0.0 {
+                    extend(&mut self.suns, self.lights.len() as u32);
+                    self.has_sized = true;
+                }
+                self.push_element(0, 0, 0.0, element::directional(towards, illuminance, angular_radius));
+                self.has_punctual = true;
+            }
+        }
+    }
+
+    /// A glowing mesh.
+    fn push_lamp(&mut self, lamps: &[LampTriangle], material: u32, shape: &LampShape) {
+        let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
+        let density = 1.0 / areas.iter().sum::<f64>();
+        match shape {
+            LampShape::Bulb(bulb) => {
+                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
+                self.has_bulbs = true;
+                return;
+            }
+            LampShape::Quad(quad) => {
+                self.push_element(0, 0, density, element::quad(quad, lamps[0].ng, material));
+                self.has_rectangles |= quad.inverse_lengths()[0] > 0.0;
+            }
+            LampShape::Triangles => {
                 let first_end = self.ends.len();
                 distribution::push_ends(&areas, &mut self.ends);
                 let ends = self.ends.len() - first_end;
                 self.most_ends = self.most_ends.max(ends as u32);
-                let density = 1.0 / areas.iter().sum::<f64>();
-                for (i, lamp) in lamps.iter().enumerate() {
-                    triangles.set_light(lamp.primitive as usize, number);
-                    let records = element::triangle(lamp, *material);
-                    if i == 0 {
-                        self.push_element(first_end as u32, ends as u32, density, records);
-                    } else {
-                        self.elements.extend(records);
-                    }
-                }
-                self.emissive_meshes += 1;
-                self.emissive_triangles += lamps.len();
-            }
-            &PreparedLight::Point { position, intensity, cone } => {
-                self.push_element(0, 0, 0.0, element::point(position, intensity, cone));
-                self.has_punctual = true;
-            }
-            &PreparedLight::Directional { towards, illuminance } => {
-                self.push_element(0, 0, 0.0, element::directional(towards, illuminance));
-                self.has_punctual = true;
+                self.push_element(first_end as u32, ends as u32, density, element::triangle(&lamps[0], material));
+                self.elements.extend(lamps[1..].iter().flat_map(|lamp| element::triangle(lamp, material)));
             }
         }
+        self.has_lamps = true;
     }
 
     /// A light whose first element has these `records`.
@@ -190,6 +200,51 @@ impl LightTable {
         self.environment.is_some()
     }
 
+    /// Numbers of the point and spot lights that scattered rays find: those that are balls, unless they are too many.
+    pub fn balls(&self) -> Range<u32> {
+        self.balls.clone()
+    }
+
+    /// Numbers of the directional lights that scattered rays find: those with an angle.
+    pub fn suns(&self) -> Range<u32> {
+        self.suns.clone()
+    }
+
+    /// What rays from `p` along the unit vectors `d` meet of the light `number` of [`Self::balls`], and the density with
+    /// which it is sampled from `from` (receivers and sums; `None` in scenes without a choice), 1/sr.
+    #[inline(always)]
+    pub fn ball<L: Lanes>(&self, number: u32, p: V3<L>, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
+        let met = Element::splat(self.records(number)).meet_ball(p, d);
+        if !met.meets.any() {
+            return met;
+        }
+        let pmf = match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf_of_ball(number, at, *total),
+            _ => L::F::one(),
+        };
+        Met { pdf: met.pdf * pmf, ..met }
+    }
+
+    /// [`Self::ball`] of the light `number` of [`Self::suns`].
+    #[inline(always)]
+    pub fn sun<L: Lanes>(&self, number: u32, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
+        let met = Element::splat(self.records(number)).meet_sun(d);
+        if !met.meets.any() {
+            return met;
+        }
+        let pmf = match (&self.choice, from) {
+            (Some(choice), Some((at, total))) => choice.pmf_of_sun(number, at, *total),
+            _ => L::F::one(),
+        };
+        Met { pdf: met.pdf * pmf, ..met }
+    }
+
+    /// Records of the elements of a light, and those after them.
+    fn records(&self, light: u32) -> &[[f32; 4]] {
+        let first = self.lights[light as usize][0].to_bits();
+        &self.elements[(first * element::RECORDS) as usize..]
+    }
+
     /// Whether the probability of a light depends on the point that it lights.
     pub fn has_choice(&self) -> bool {
         self.choice.is_some()
@@ -206,17 +261,34 @@ impl LightTable {
         Receiver { p, n, both_sides: L::M::from_bits(0), least: L::F::zero() }
     }
 
-    /// Density (1/m^2) of a point on the surfaces `light`, given that they are chosen; 0 for [`NONE`].
+    /// Density (1/sr) of the point `at` on the surfaces `light` (a number of a light), seen in the unit direction -`wo` from
+    /// `distance` metres away, at the cosine `cos` to its normal; given that they are chosen.
     #[inline(always)]
-    pub fn density<L: Lanes>(&self, light: L::U) -> L::F {
-        let is_light = !light.eq(L::U::splat(NONE));
-        if !is_light.any() {
-            return L::F::zero();
+    pub fn density<L: Lanes>(&self, light: L::U, at: V3<L>, wo: V3<L>, distance: L::F, cos: L::F) -> L::F {
+        let record = light.records(&self.lights);
+        let mut density = record[3] * distance * distance / cos;
+        if !self.has_bulbs && !self.has_rectangles {
+            return density;
         }
-        light.records(&self.lights)[3].masked(is_light)
+        let is_bulb = record[3].lt(L::F::zero());
+        let element = Element::<L>::load(&self.elements, record[0].to_bits(), L::F::one(), L::F::one());
+        let from = wo.mul_add(distance, at);
+        if self.has_rectangles {
+            let (span, by_angle) = element.span(&self.elements, from);
+            density = span.pdf().or_else(by_angle, density);
+        }
+        if self.has_bulbs {
+            density = element.pdf_of_bulb(from).or_else(is_bulb, density);
+        }
+        density
     }
 
-    /// Probability with which [`Self::sample`] chooses the surfaces `light` (not [`NONE`]) from the receivers and sums of
+    /// Some lights are sampled by rays that look for them, see [`LightSample::sought`].
+    pub fn has_bulbs(&self) -> bool {
+        self.has_bulbs
+    }
+
+    /// Probability with which [`Self::sample`] chooses the surfaces `light` (no other number) from the receivers and sums of
     /// `from`: `None` in scenes without a choice.
     #[inline(always)]
     pub fn pmf<L: Lanes>(&self, light: L::U, from: Option<(Receiver<L>, L::F)>) -> L::F {
@@ -266,10 +338,15 @@ impl LightTable {
     }
 }
 
+/// Appends a number to those from the first to the last.
+fn extend(numbers: &mut Range<u32>, number: u32) {
+    *numbers = if numbers.end == 0 { number } else { numbers.start }..number + 1;
+}
+
 /// How `lights` look from afar.
 fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candidates {
     let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-    let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, suns: Vec::new(), sky, radius };
+    let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, balls: 0, suns: Vec::new(), sky, radius };
     for light in lights {
         match light {
             PreparedLight::Mesh { triangles, radiance, both_sides, .. } => {
@@ -277,18 +354,21 @@ fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candid
                 candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides));
                 candidates.surfaces += 1;
             }
-            &PreparedLight::Point { position, intensity, cone } => {
+            &PreparedLight::Point { position, intensity, cone, radius } => {
                 let (position, intensity) = (position.as_dvec3(), mean(intensity));
-                candidates.placed.push(match cone {
+                let small = match cone {
                     Some((axis, inner, outer)) => {
                         let (inner, outer) = (f64::from(inner), f64::from(outer));
                         Bounds::of_spot(position, intensity, axis.as_dvec3(), inner, outer)
                     }
                     None => Bounds::of_point(position, intensity),
-                });
+                };
+                candidates.placed.push(small.with_radius(radius));
+                candidates.balls += usize::from(radius > 0.0);
             }
-            &PreparedLight::Directional { towards, illuminance } => {
-                candidates.suns.push((towards.as_dvec3(), mean(illuminance)));
+            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
+                let (towards, illuminance) = (towards.as_dvec3(), mean(illuminance));
+                candidates.suns.push(Sun { towards, illuminance, angular_radius });
             }
         }
     }
@@ -319,14 +399,14 @@ impl<L: Lanes> Part<L> for Sample<'_, L> {
         }
         let element = Element::<L>::load(&lights.elements, index, pmf, record[3]);
         let Some(environment) = lights.environment.as_ref().filter(|_| lights.samples_environment) else {
-            return lights.sample_near(&element, p, [u[1], u[2]], &sources);
+            return lights.sample_near(&element, light, p, [u[1], u[2]], &sources);
         };
         let far = element.is_environment();
         let sky = sample_environment(environment, pmf, [u[1], u[2]]);
         if !lights.has_triangles() && !lights.has_punctual {
             return sky;
         }
-        merged(far, sky, lights.sample_near(&element, p, [u[1], u[2]], &sources))
+        merged(far, sky, lights.sample_near(&element, light, p, [u[1], u[2]], &sources))
     }
 }
 
@@ -336,19 +416,46 @@ impl LightTable {
     fn sample_near<L: Lanes>(
         &self,
         element: &Element<L>,
+        light: L::U,
         p: V3<L>,
         u: [L::F; 2],
         sources: &Sources<'_>,
     ) -> LightSample<L> {
         if !self.has_punctual {
-            return element.sample_triangle(&self.elements, p, u, sources);
+            return self.sample_surface(element, light, p, u, sources);
         }
-        let punctual = element.sample_punctual(p);
-        let on_triangle = element.is_triangle();
-        if !self.has_triangles() || !on_triangle.any() {
+        let punctual = if self.has_sized {
+            // Balls that are too many to be looked for.
+            element.sample_sized(p, u, self.choice.as_ref().is_none_or(Choice::finds_balls))
+        } else {
+            element.sample_punctual(p)
+        };
+        let on_surface = element.is_surface();
+        if !self.has_triangles() || !on_surface.any() {
             return punctual;
         }
-        merged(on_triangle, element.sample_triangle(&self.elements, p, u, sources), punctual)
+        merged(on_surface, self.sample_surface(element, light, p, u, sources), punctual)
+    }
+
+    /// Lamps and bulbs.
+    #[inline(always)]
+    fn sample_surface<L: Lanes>(
+        &self,
+        element: &Element<L>,
+        light: L::U,
+        p: V3<L>,
+        u: [L::F; 2],
+        sources: &Sources<'_>,
+    ) -> LightSample<L> {
+        if !self.has_bulbs {
+            return element.sample_lamp(&self.elements, p, u, sources, self.has_rectangles);
+        }
+        let bulb = element.sample_bulb(light, p, u);
+        let on_lamp = element.is_lamp();
+        if !self.has_lamps || !on_lamp.any() {
+            return bulb;
+        }
+        merged(on_lamp, element.sample_lamp(&self.elements, p, u, sources, self.has_rectangles), bulb)
     }
 }
 
@@ -359,8 +466,10 @@ fn merged<L: Lanes>(lanes: L::M, a: LightSample<L>, b: LightSample<L>) -> LightS
         radiance: a.radiance.or_else(lanes, b.radiance),
         wi: a.wi.or_else(lanes, b.wi),
         pdf: a.pdf.or_else(lanes, b.pdf),
-        is_delta: (a.is_delta & lanes) | (b.is_delta & !lanes),
+        is_hidden: (a.is_hidden & lanes) | (b.is_hidden & !lanes),
         end: a.end.or_else(lanes, b.end),
+        sought: a.sought.or_else(lanes, b.sought),
+        reach: a.reach.or_else(lanes, b.reach),
         is_distant: (a.is_distant & lanes) | (b.is_distant & !lanes),
         valid: (a.valid & lanes) | (b.valid & !lanes),
         total: a.total.or_else(lanes, b.total),

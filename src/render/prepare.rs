@@ -15,7 +15,8 @@ use crate::integrator::{Coverage, SceneTables, Spectrum};
 use crate::light::element::LampTriangle;
 use crate::light::environment::EnvironmentTable;
 use crate::light::parts::connected;
-use crate::light::table::{LightTable, PreparedLight};
+use crate::light::prepared::{LampShape, PreparedLight};
+use crate::light::table::LightTable;
 use crate::light::{Light, studio};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
@@ -220,15 +221,21 @@ fn prepare_all(
     }
     warnings.extend(losses.iter().cloned());
     let radius = bounds.map_or(0.0, |(low, high)| 0.5 * (high - low).length());
-    punctual(scene, origin, &mut lights);
+    punctual(scene, origin, settings, &mut lights);
     let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
     let environment = environment(scene, default_light.used);
     if lights.is_empty() && environment.is_none() {
         warnings.push(default_light.darkness(scene));
     }
-    warnings.extend(refraction::lights_that_glass_hides(scene));
-    let lights = LightTable::new(lights, environment, radius, &mut triangles);
     let media = MediumTable::new(&scene.materials);
+    if media.has_thin_glass() {
+        // Shadow rays go through it step by step, to an end that they know.
+        for light in &mut lights {
+            light.forget_bulb();
+        }
+    }
+    let lights = LightTable::new(lights, environment, radius, &mut triangles);
+    warnings.extend(refraction::lights_that_glass_hides(scene, !lights.balls().is_empty(), !lights.suns().is_empty()));
     let spectrum = media.has_dispersion().then(Spectrum::default);
     let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
     let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
@@ -318,7 +325,8 @@ fn flatten(
     // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
     let mirrors = linear.determinant() < 0.0;
     let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
-    let part = parts.of(opacities.let_rays_pass(scene, mesh));
+    let lets_rays_pass = opacities.let_rays_pass(scene, mesh);
+    let part = parts.of(lets_rays_pass);
     let triangles = &mut part.triangles;
     let first = triangles.positions.len() as u32;
     triangles.positions.extend(mesh.positions.iter().map(|&p| {
@@ -384,7 +392,9 @@ fn flatten(
         let both_sides = material.is_some_and(|m| m.double_sided);
         for triangles in connected(lamps) {
             let material = mesh.material.0;
-            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material });
+            // What is there in part only would have to be asked about twice.
+            let shape = LampShape::of(&triangles, !lets_rays_pass);
+            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material, shape });
         }
         totals.surface.add(mesh_area, material, emission);
     }
@@ -402,19 +412,21 @@ fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 
 }
 
 /// Adds the punctual lights that shine at all.
-fn punctual(scene: &Scene, origin: DVec3, lights: &mut Vec<PreparedLight>) {
+fn punctual(scene: &Scene, origin: DVec3, settings: &RenderSettings, lights: &mut Vec<PreparedLight>) {
+    let (radius, angular_radius) = (settings.light_radius, 0.5 * settings.sun_angle.to_radians());
     for placed in &scene.lights {
         let position = (placed.world_from_light.w_axis.truncate() - origin).as_vec3();
         let axis = -placed.world_from_light.z_axis.truncate().normalize();
         let (light, color) = match placed.light {
-            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None }, intensity),
+            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None, radius }, intensity),
             Light::Spot { intensity, inner_cone, outer_cone } => {
                 let (inner, outer) = (f64::from(inner_cone).cos(), f64::from(outer_cone).cos());
                 let cone = Some((axis.as_vec3(), inner as f32, outer as f32));
-                (PreparedLight::Point { position, intensity, cone }, intensity)
+                (PreparedLight::Point { position, intensity, cone, radius }, intensity)
             }
             Light::Directional { illuminance } => {
-                (PreparedLight::Directional { towards: (-axis).as_vec3(), illuminance }, illuminance)
+                let towards = (-axis).as_vec3();
+                (PreparedLight::Directional { towards, illuminance, angular_radius }, illuminance)
             }
         };
         // Not for NaN either.

@@ -8,11 +8,14 @@ use crate::scene::Scene;
 const NAMES: usize = 4;
 
 /// What is said of a scene with lights without size and glass that bends light: shadow rays end at such glass, and a path
-/// that is bent by it never meets a point exactly. `None` where one or the other is missing.
-pub(super) fn lights_that_glass_hides(scene: &Scene) -> Option<String> {
+/// that is bent by it never meets a point exactly. `None` where one or the other is missing. Paths find point and spot lights
+/// where those are balls (`finds_balls`), and directional lights where those are suns.
+pub(super) fn lights_that_glass_hides(scene: &Scene, finds_balls: bool, finds_suns: bool) -> Option<String> {
     let seen = |m: &&Material| scene.instances.iter().any(|i| is_of(scene, i.mesh.index(), m));
     let glass = scene.materials.iter().filter(|m| bends(m)).find(seen)?;
-    let names: Vec<&str> = scene.lights.iter().filter(|l| shines(&l.light)).map(|l| l.name.as_str()).collect();
+    let is_found = |light: &Light| if matches!(light, Light::Directional { .. }) { finds_suns } else { finds_balls };
+    let hidden = scene.lights.iter().filter(|l| shines(&l.light) && !is_found(&l.light));
+    let names: Vec<&str> = hidden.map(|l| l.name.as_str()).collect();
     if names.is_empty() {
         return None;
     }
@@ -22,7 +25,8 @@ pub(super) fn lights_that_glass_hides(scene: &Scene) -> Option<String> {
     let (noun, have, them) = if names.len() == 1 { ("light", "has", "it") } else { ("lights", "have", "them") };
     Some(format!(
         "{noun} {listed}{more} {have} no size: nothing is lit by {them} through glass that bends light, such as that of \
-         material \"{}\". A lamp with a radius, a sun with an angle (an emissive surface or an environment) lights it",
+         material \"{}\". A size does it: --light-radius METRES for lamps (at most 256), --sun-angle DEG for suns; so do \
+         emissive surfaces and environments",
         glass.name
     ))
 }
@@ -80,20 +84,30 @@ mod tests {
     #[test]
     fn lights_without_size_behind_glass_that_bends_are_named() {
         for material in [glass(0.0, true), glass(0.4, false)] {
-            let warning = lights_that_glass_hides(&scene(material, 2)).expect("a warning");
-            for part in ["\"Lamp 0\", \"Lamp 1\" have no size", "\"Glass\"", "radius", "angle"] {
+            let warning = lights_that_glass_hides(&scene(material, 2), false, false).expect("a warning");
+            for part in ["\"Lamp 0\", \"Lamp 1\" have no size", "\"Glass\"", "--light-radius", "--sun-angle"] {
                 assert!(warning.contains(part), "{warning}");
             }
         }
-        let many = lights_that_glass_hides(&scene(glass(0.0, true), 7)).expect("a warning");
+        let many = lights_that_glass_hides(&scene(glass(0.0, true), 7), false, false).expect("a warning");
         assert!(many.contains("and 3 more") && !many.contains("Lamp 4"), "{many}");
     }
 
     #[test]
     fn nothing_is_said_of_glass_that_lets_shadow_rays_through_nor_without_such_lights() {
-        assert_eq!(lights_that_glass_hides(&scene(glass(0.0, false), 1)), None);
-        assert_eq!(lights_that_glass_hides(&scene(glass(0.0, true), 0)), None);
-        assert_eq!(lights_that_glass_hides(&scene(Material::default(), 1)), None);
-        assert_eq!(lights_that_glass_hides(&scene(Material { unlit: true, ..glass(0.4, true) }, 1)), None);
+        assert_eq!(lights_that_glass_hides(&scene(glass(0.0, false), 1), false, false), None);
+        assert_eq!(lights_that_glass_hides(&scene(glass(0.0, true), 0), false, false), None);
+        assert_eq!(lights_that_glass_hides(&scene(Material::default(), 1), false, false), None);
+        assert_eq!(
+            lights_that_glass_hides(&scene(Material { unlit: true, ..glass(0.4, true) }, 1), false, false),
+            None
+        );
+    }
+
+    #[test]
+    fn lights_with_a_size_are_found_through_glass() {
+        let warning = |balls, suns| lights_that_glass_hides(&scene(glass(0.0, true), 2), balls, suns);
+        assert_eq!(warning(true, false), None);
+        assert!(warning(false, true).is_some(), "those of the scene are no suns");
     }
 }

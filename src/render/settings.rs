@@ -104,6 +104,10 @@ pub struct RenderSettings {
     pub brdf: Brdf,
     /// Built-in studio light.
     pub default_light: DefaultLight,
+    /// Point and spot lights are balls of this radius, metres, in `[0, 1e6]`; 0: without size.
+    pub light_radius: f64,
+    /// Directional lights are suns of this angular diameter, degrees, in `[0, 180]`; 0: without size.
+    pub sun_angle: f64,
     /// What is to be had beside the picture; changes none of its bytes.
     pub layers: Layers,
     /// Ray backend.
@@ -137,6 +141,8 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),
+            light_radius: 0.0,
+            sun_angle: 0.0,
             layers: Layers::default(),
             accel: AccelChoice::default(),
             embree_dirs: Vec::new(),

@@ -7,7 +7,7 @@ use prt::material::Material;
 use prt::render::{AccelChoice, Choice, Prepared, RenderSettings, prepare_placing};
 use prt::scene::{Instance, MaterialId, Scene, SceneBuilder};
 use prt::shape::Mesh;
-use prt::shape::table::interpolate3;
+use prt::shape::table::{NONE, interpolate3};
 use simd::{Float, Kernel, Lanes, Level, Mask, Uint};
 
 /// A mesh of positions and triangles alone.
@@ -132,6 +132,14 @@ pub fn read_placed(prepared: &Prepared, points: &[(u32, u32, f32, f32)]) -> Vec<
                         })),
                         None => DVec3::splat(get(offset)),
                     };
+                let is_light = !triangle.light.eq(L::U::splat(NONE));
+                let density = if is_light.any() {
+                    // Seen from 1 m straight above it.
+                    let one = L::F::splat(1.0);
+                    get(tables.lights.density::<L>(triangle.light, p, triangle.ng, one, one))
+                } else {
+                    0.0
+                };
                 Seen {
                     instance,
                     primitive,
@@ -142,7 +150,7 @@ pub fn read_placed(prepared: &Prepared, points: &[(u32, u32, f32, f32)]) -> Vec<
                     ns: normal.map_or(ng, DVec3::normalize_or_zero),
                     offset: get(offset),
                     bound,
-                    light_density: get(tables.lights.density::<L>(triangle.light)),
+                    light_density: density,
                 }
             };
             self.1.iter().map(one).collect()

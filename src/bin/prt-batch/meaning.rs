@@ -135,6 +135,8 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         cull_backfaces: args.cull_backfaces,
         texture_lod: args.texture_lod,
         default_light: args.default_light,
+        light_radius: args.light_radius,
+        sun_angle: args.sun_angle,
         accel: args.accel,
         embree_dirs: embree_dirs(),
         ..RenderSettings::default()

@@ -84,6 +84,17 @@ pub fn env_scale(value: &str) -> Result<f64, String> {
     value.parse().ok().filter(inside).ok_or_else(|| "must be a factor from 0 to 1e9".into())
 }
 
+/// Metres, so that squares of them stay numbers in the renderer's 32 bits.
+pub fn light_radius(value: &str) -> Result<f64, String> {
+    let inside = |metres: &f64| *metres == 0.0 || (1e-6..=1e6).contains(metres);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be metres from 1e-6 to 1e6, or 0 for no size".into())
+}
+
+pub fn sun_angle(value: &str) -> Result<f64, String> {
+    let inside = |degrees: &f64| *degrees == 0.0 || (1e-4..=180.0).contains(degrees);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be degrees from 1e-4 to 180, or 0 for no size".into())
+}
+
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
 }

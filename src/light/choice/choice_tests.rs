@@ -9,7 +9,7 @@ use crate::math::random::Rng;
 use glam::{DVec3, Vec3};
 use simd::{Kernel, Mask};
 
-/// Surfaces first; every kind, size and direction, within 10 m.
+/// Surfaces first, then points, half of them balls; every kind, size and direction, within 10 m.
 fn lights(surfaces: usize, points: usize, rng: &mut Rng) -> Vec<Bounds> {
     let at = |rng: &mut Rng| 10.0 * rng.cube().as_dvec3();
     let mut lights = Vec::new();
@@ -23,18 +23,25 @@ fn lights(surfaces: usize, points: usize, rng: &mut Rng) -> Vec<Bounds> {
     }
     for i in 0..points {
         let (p, intensity) = (at(rng), f64::from(rng.range(0.1, 100.0)));
-        lights.push(match i % 2 {
+        let light = match i % 2 {
             0 => Bounds::of_point(p, intensity),
             _ => Bounds::of_spot(p, intensity, rng.direction().as_dvec3(), 0.9, 0.6),
-        });
+        };
+        lights.push(if i < points / 2 { light.with_radius(f64::from(rng.range(0.1, 2.0))) } else { light });
     }
     lights
 }
 
 fn choice_of(placed: Vec<Bounds>, surfaces: usize, sky: bool) -> (Choice, Vec<u32>) {
-    let suns = if sky { vec![(DVec3::Y, 3.0), (DVec3::new(0.6, -0.8, 0.0), 1.0)] } else { Vec::new() };
+    choice_with_balls(placed, surfaces, 0, sky)
+}
+
+fn choice_with_balls(placed: Vec<Bounds>, surfaces: usize, balls: usize, sky: bool) -> (Choice, Vec<u32>) {
+    let sun = |towards, illuminance, angular_radius| Sun { towards, illuminance, angular_radius };
+    let suns = vec![sun(DVec3::Y, 3.0, 0.0), sun(DVec3::new(0.6, -0.8, 0.0), 1.0, 0.1)];
+    let suns = if sky { suns } else { Vec::new() };
     let sky = sky.then(|| Sky::new([(DVec3::Y, 5.0, 1.0), (DVec3::NEG_Y, 1.0, 11.5)].into_iter()).expect("a sky"));
-    Choice::new(Candidates { placed, surfaces, suns, sky, radius: 20.0 })
+    Choice::new(Candidates { placed, surfaces, balls, suns, sky, radius: 20.0 })
 }
 
 fn receiver<L: Lanes>(p: Vec3, n: Vec3) -> Receiver<L> {
@@ -80,7 +87,8 @@ impl Kernel for Check {
         const N: usize = 4096;
         let Self { surfaces, points, sky } = self;
         let mut rng = Rng::new(3);
-        let (choice, order) = choice_of(lights(surfaces, points, &mut rng), surfaces, sky);
+        let placed = lights(surfaces, points, &mut rng);
+        let (choice, order) = choice_with_balls(placed, surfaces, points / 2, sky);
         let placed = surfaces + points;
         for _ in 0..12 {
             let at = receiver::<L>(10.0 * rng.cube(), rng.direction());
@@ -176,6 +184,30 @@ impl Kernel for NeverNone {
 fn lgt_06_no_light_is_impossible_that_can_contribute() {
     at_all_levels(NeverNone(40));
     at_all_levels(NeverNone(700));
+}
+
+#[test]
+fn lgt_04_a_ball_is_possible_while_any_of_it_is_above_the_horizon() {
+    struct Horizon;
+    impl Kernel for Horizon {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Lanes>(self) {
+            let mut rng = Rng::new(5);
+            for _ in 0..1000 {
+                let (place, radius) = (rng.direction().as_dvec3() * f64::from(rng.range(1.0, 9.0)), 0.9);
+                let ball = Bounds::of_point(place, 1.0);
+                let (choice, _) = choice_with_balls(vec![ball.with_radius(radius)], 0, 1, false);
+                let n = rng.direction();
+                let (at, mut scratch) = (receiver::<L>(Vec3::ZERO, n), vec![0.0; choice.scratch()]);
+                let total = floats::<L>(choice.choose(&at, L::F::zero(), &mut scratch).total)[0];
+                let height = place.dot(n.as_dvec3());
+                assert!((total > 0.0) == (height > -radius) || (height + radius).abs() < 2e-3, "{height}: {total}");
+            }
+        }
+    }
+    simd::dispatch(simd::Level::Scalar, Horizon);
 }
 
 #[test]

@@ -86,10 +86,33 @@ pub fn of_point<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> L::F {
     light[0] * size * size * shines * facing(v, inverse, at).max(at.least)
 }
 
-/// The importance of parallel light: direction towards it and illuminance.
+/// The importance of a point or spot light that is a ball: [`of_point`] where all of it is above the horizon.
 #[inline(always)]
-pub fn of_sun<L: Lanes>(sun: &[L::F; 4], at: &Receiver<L>) -> L::F {
-    sun[3] * facing(V3::<L>::of_record(sun), L::F::one(), at).max(at.least)
+pub fn of_ball<L: Lanes>(group: &Group<L>, at: &Receiver<L>) -> L::F {
+    let [place, direction, light] = group;
+    let (zero, one) = (L::F::zero(), L::F::one());
+    let v = V3::<L>::of_record(place) - at.p;
+    let inverse = one / v.dot(v).max(L::F::splat(LEAST_SQUARE)).sqrt();
+    let size = (place[3] * inverse).min(one);
+    let cos = -(V3::<L>::of_record(direction).dot(v) * inverse);
+    let shines = ((cos - light[1]) * light[2]).max(zero).min(one);
+    light[0] * size * size * shines * facing_disc(facing(v, inverse, at), size, at).max(at.least)
+}
+
+/// The importance of parallel light: direction towards it and illuminance, the sine of its angular radius.
+#[inline(always)]
+pub fn of_sun<L: Lanes>([sun, size]: &[[L::F; 4]; 2], at: &Receiver<L>) -> L::F {
+    sun[3] * facing_disc(facing(V3::<L>::of_record(sun), L::F::one(), at), size[0], at).max(at.least)
+}
+
+/// The mean cosine over a disc of directions of the sine `size` about one of the cosine `cos`: what is above the horizon,
+/// by a parabola that meets both ends in value and slope. Above 0 where any of it is.
+#[inline(always)]
+fn facing_disc<L: Lanes>(cos: L::F, size: L::F, at: &Receiver<L>) -> L::F {
+    let above = cos + size;
+    let part = (above * above * L::F::splat(0.25) / size).masked(above.gt(L::F::zero()));
+    // Both sides gather all of it.
+    cos.or_else(at.both_sides | cos.ge(size), part)
 }
 
 /// Cosine between the normal and `v` of length 1 / `inverse`.

@@ -16,7 +16,7 @@ pub use sky::Sky;
 
 use super::bounds::Bounds;
 use cut::CUT;
-use importance::{of_group, of_point, of_sun};
+use importance::{of_ball, of_group, of_point, of_sun};
 use simd::{Float, Lanes, Part, Uint};
 use tree::Tree;
 
@@ -26,21 +26,35 @@ pub const MOST_ASKED: usize = 256;
 const LEAST_PART: f64 = 1e-4;
 /// Records of a light in the list.
 const RECORDS: u32 = 3;
+/// Of parallel light.
+const SUN_RECORDS: usize = 2;
 /// The largest f32 below 1.
 const BELOW_1: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// What the lights of a scene look like from afar, in the order of the choice.
 pub struct Candidates {
-    /// Lights with a place: surfaces first, then points and spots.
+    /// Lights with a place: surfaces first, then points and spots that are balls, then those without size.
     pub placed: Vec<Bounds>,
     /// How many of them are surfaces.
     pub surfaces: usize,
-    /// Direction towards the light and illuminance (mean over channels) of parallel light.
-    pub suns: Vec<(glam::DVec3, f64)>,
+    /// How many are balls.
+    pub balls: usize,
+    /// Parallel light.
+    pub suns: Vec<Sun>,
     /// The environment, if it is sampled.
     pub sky: Option<Sky>,
     /// Of the scene, metres.
     pub radius: f64,
+}
+
+/// Parallel light as the choice knows it.
+pub struct Sun {
+    /// Unit, to its middle.
+    pub towards: glam::DVec3,
+    /// Mean over channels, lux.
+    pub illuminance: f64,
+    /// Half the angle that it is seen at, radians, at most pi/2.
+    pub angular_radius: f64,
 }
 
 /// How to choose among two or more lights.
@@ -48,12 +62,13 @@ pub struct Candidates {
 pub struct Choice {
     /// Those with a place, [`RECORDS`] each; empty where there is a tree.
     list: Vec<[f32; 4]>,
-    /// How many in the list are surfaces; points follow.
+    /// How many in the list are surfaces; balls, then points follow.
     surfaces: usize,
+    balls: usize,
     tree: Option<Tree>,
     /// Lights with a place.
     placed: usize,
-    /// Direction and illuminance.
+    /// Direction and illuminance, then the sine of the angular radius: [`SUN_RECORDS`] each.
     suns: Vec<[f32; 4]>,
     sky: Option<Sky>,
 }
@@ -71,11 +86,11 @@ pub struct Chosen<L: Lanes> {
 impl Choice {
     /// Prepares the choice, and the order in which it counts lights with a place: numbers in `candidates.placed`.
     pub fn new(candidates: Candidates) -> (Self, Vec<u32>) {
-        let Candidates { placed, surfaces, suns, sky, radius } = candidates;
+        let Candidates { placed, surfaces, balls, suns, sky, radius } = candidates;
         let radius = radius.max(f64::from(f32::MIN_POSITIVE).sqrt());
         // About 1 in the middle of the scene: far from both ends of f32.
         let brightest = placed.iter().map(|b| b.strength() / (radius * radius));
-        let brightest = brightest.chain(suns.iter().map(|s| s.1)).chain(sky.as_ref().map(Sky::brightest));
+        let brightest = brightest.chain(suns.iter().map(|s| s.illuminance)).chain(sky.as_ref().map(Sky::brightest));
         let scale = 1.0 / brightest.fold(f64::MIN_POSITIVE, f64::max);
         let least = radius * LEAST_PART;
         let mut order: Vec<u32> = (0..placed.len() as u32).collect();
@@ -85,21 +100,25 @@ impl Choice {
         } else {
             tree = Some(Tree::new(&placed, &mut order, scale, least));
         }
-        let sun = |(d, e): &(glam::DVec3, f64)| [d.x as f32, d.y as f32, d.z as f32, (e * scale) as f32];
-        let suns = suns.iter().map(sun).collect();
+        let sun = |sun: &Sun| {
+            let d = sun.towards;
+            let place = [d.x as f32, d.y as f32, d.z as f32, (sun.illuminance * scale) as f32];
+            [place, [sun.angular_radius.sin() as f32, 0.0, 0.0, 0.0]]
+        };
+        let suns = suns.iter().flat_map(sun).collect();
         let sky = sky.map(|sky| sky.scaled(scale));
-        (Self { list, surfaces, tree, placed: placed.len(), suns, sky }, order)
+        (Self { list, surfaces, balls, tree, placed: placed.len(), suns, sky }, order)
     }
 
     /// Numbers of f32 that [`Self::choose`] needs beside it.
     pub fn scratch(&self) -> usize {
         let near = if self.tree.is_some() { CUT } else { self.placed };
-        (near + self.suns.len() + usize::from(self.sky.is_some())) * 16
+        (near + self.suns.len() / SUN_RECORDS + usize::from(self.sky.is_some())) * 16
     }
 
     /// The number of the light that is the sky.
     pub fn sky_number(&self) -> u32 {
-        (self.placed + self.suns.len()) as u32
+        (self.placed + self.suns.len() / SUN_RECORDS) as u32
     }
 
     /// A light for each receiver, by `u` in [0, 1).
@@ -113,6 +132,28 @@ impl Choice {
     #[inline(always)]
     pub fn pmf<L: Lanes>(&self, light: L::U, at: &Receiver<L>, total: L::F) -> L::F {
         L::outline(Pmf { choice: self, light, at, total })
+    }
+
+    /// Scattered rays find lights that are balls: all are asked, so all may as well be looked for.
+    pub fn finds_balls(&self) -> bool {
+        self.tree.is_none()
+    }
+
+    /// The probability with which [`Self::choose`] takes the ball number `light`; there must be no tree.
+    #[inline(always)]
+    pub fn pmf_of_ball<L: Lanes>(&self, light: u32, at: &Receiver<L>, total: L::F) -> L::F {
+        let first = light as usize * RECORDS as usize;
+        let Some([a, b, c]) = self.list.get(first..first + RECORDS as usize) else { return L::F::zero() };
+        let group = [splat::<L>(a), splat::<L>(b), splat::<L>(c)];
+        (of_ball(&group, at) / total).masked(total.gt(L::F::zero()))
+    }
+
+    /// The probability with which [`Self::choose`] takes the parallel light number `light`.
+    #[inline(always)]
+    pub fn pmf_of_sun<L: Lanes>(&self, light: u32, at: &Receiver<L>, total: L::F) -> L::F {
+        let first = (light as usize - self.placed) * SUN_RECORDS;
+        let Some([place, size]) = self.suns.get(first..first + SUN_RECORDS) else { return L::F::zero() };
+        (of_sun(&[splat::<L>(place), splat::<L>(size)], at) / total).masked(total.gt(L::F::zero()))
     }
 
     /// The probability with which [`Self::choose`] takes the sky.
@@ -150,13 +191,19 @@ impl<L: Lanes> Part<L> for Choose<'_, L> {
         } else {
             for (i, records) in choice.list.chunks_exact(RECORDS as usize).enumerate() {
                 let group = [splat::<L>(&records[0]), splat::<L>(&records[1]), splat::<L>(&records[2])];
-                let importance = if i < choice.surfaces { of_group(&group, at).0 } else { of_point(&group, at) };
+                let importance = if i < choice.surfaces {
+                    of_group(&group, at).0
+                } else if i < choice.surfaces + choice.balls {
+                    of_ball(&group, at)
+                } else {
+                    of_point(&group, at)
+                };
                 push::<L>(importance, scratch, &mut n, &mut total);
             }
         }
         let near = n;
-        for sun in &choice.suns {
-            push::<L>(of_sun(&splat::<L>(sun), at), scratch, &mut n, &mut total);
+        for sun in choice.suns.chunks_exact(SUN_RECORDS) {
+            push::<L>(of_sun(&[splat::<L>(&sun[0]), splat::<L>(&sun[1])], at), scratch, &mut n, &mut total);
         }
         if let Some(sky) = &choice.sky {
             push::<L>(sky.importance(at), scratch, &mut n, &mut total);

@@ -4,7 +4,9 @@ use super::build::{
     add_box, add_camera, add_floor, add_light, add_mesh, add_quad, add_room, add_triangles, ball, lambert, lamp,
     white_dielectric, white_metal,
 };
-use super::exact::{closed_room, corner_form_factor, polygon_irradiance, slab, spot_attenuation, triangles_irradiance};
+use super::exact::{
+    ball_irradiance, closed_room, corner_form_factor, polygon_irradiance, slab, spot_attenuation, triangles_irradiance,
+};
 use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::material::energy::Brdf;
@@ -31,6 +33,10 @@ pub struct Case {
     pub max_bounces: Option<u32>,
     /// Microfacet model.
     pub brdf: Brdf,
+    /// Of point and spot lights, metres.
+    pub light_radius: f64,
+    /// Of directional lights, degrees.
+    pub sun_angle: f64,
     /// Samples by the usual number: noisy scenes need more.
     pub effort: u32,
 }
@@ -47,7 +53,9 @@ const LEVEL: u32 = 5;
 impl Case {
     fn new(name: &'static str, id: &'static str, builder: SceneBuilder, exact: f64) -> Self {
         let scene = builder.finish();
-        Self { name, id, scene, exact, model: ROUNDING, max_bounces: None, brdf: Brdf::Full, effort: 1 }
+        let brdf = Brdf::Full;
+        let (light_radius, sun_angle) = (0.0, 0.0);
+        Self { name, id, scene, exact, model: ROUNDING, max_bounces: None, brdf, light_radius, sun_angle, effort: 1 }
     }
 
     fn model(self, model: f64) -> Self {
@@ -62,6 +70,7 @@ impl Case {
 /// All of them.
 pub fn cases() -> Vec<Case> {
     let mut all = punctual();
+    all.extend(sized());
     all.extend(lamps());
     all.extend(skies());
     all.extend(rooms());
@@ -126,6 +135,69 @@ fn punctual() -> Vec<Case> {
         lux += f64::from(intensity) * p.normalize().y / p.length_squared();
     }
     all.push(Case::new("400 point lights", "LGT-06", b, lit(lux)));
+    all
+}
+
+/// Punctual lights with a size. Their floors end short of the lights: what is below the horizon is not hidden otherwise.
+fn sized() -> Vec<Case> {
+    let mut all = Vec::new();
+    let floor = || {
+        let mut b = SceneBuilder::new(0);
+        let material = b.add_material(lambert(FLOOR));
+        add_floor(&mut b, 0.01, material);
+        add_camera(&mut b, DVec3::new(-0.3, 0.5, 0.2), DVec3::ZERO, POINT_VIEW);
+        b
+    };
+    for (name, at, radius) in [
+        ("light of 1 m", DVec3::new(1.2, 1.6, 0.0), 1.0_f64),
+        ("light of 1 m, partly below the horizon", DVec3::new(2.0, -0.3, 0.5), 1.0),
+        ("light of 1 m, 1 mm away", DVec3::new(0.0, 0.6, 0.8) * 1.001, 1.0),
+        ("light of 1 um", DVec3::new(3.0, 1.5, -2.0), 1e-6),
+    ] {
+        let mut b = floor();
+        add_light(&mut b, Light::Point { intensity: [100.0; 3] }, at, DVec3::NEG_Y);
+        let (s2, cos) = (radius * radius / at.length_squared(), at.normalize().y);
+        let lux = ball_irradiance(s2, cos) * 100.0 / (PI * radius * radius);
+        // The distance to the near surface is 1e-3 of what f32 has subtracted.
+        all.push(Case { light_radius: radius, ..Case::new(name, "LGT-04", b, lit(lux)).model(2e-4) });
+    }
+
+    let mut b = floor();
+    let (inner_cone, outer_cone, theta) = (0.3, 0.6, 0.45_f64);
+    let spot = Light::Spot { intensity: [100.0; 3], inner_cone, outer_cone };
+    add_light(&mut b, spot, DVec3::Y * 2.0, DVec3::new(theta.sin(), -theta.cos(), 0.0));
+    let fade = spot_attenuation(theta, f64::from(inner_cone), f64::from(outer_cone));
+    let case = Case::new("spot light of 0.5 m", "LGT-02", b, lit(25.0 * fade));
+    all.push(Case { light_radius: 0.5, ..case }.model(1e-4));
+
+    for (name, height, angle) in [
+        ("sun of 0.53 degrees", 50.0_f64, 0.53),
+        ("sun of 1e-4 degrees", 50.0, 1e-4),
+        ("sun of 40 degrees, partly below the horizon", 12.0, 40.0),
+        ("sun of 180 degrees, half below the horizon", 0.0, 180.0),
+    ] {
+        let mut b = floor();
+        let (sin, cos) = height.to_radians().sin_cos();
+        add_light(&mut b, Light::Directional { illuminance: [10.0; 3] }, DVec3::X, DVec3::new(cos, -sin, 0.0));
+        let s2 = (0.5 * f64::to_radians(angle)).sin().powi(2);
+        // A sun of half the sky, cut by the horizon: half of what a whole one gives.
+        let lux = if s2 < 1.0 { ball_irradiance(s2, sin) / (PI * s2) } else { 0.5 };
+        all.push(Case { sun_angle: angle, ..Case::new(name, "LGT-05", b, lit(10.0 * lux)).model(1e-4) });
+    }
+
+    // Chosen among others, by points that see a part of them.
+    let mut b = floor();
+    let mut lux = 0.0;
+    for i in 0..20 {
+        let turn = 0.3 * f64::from(i);
+        let at = DVec3::new(2.0 * turn.cos(), 0.1 * f64::from(i) - 0.4, 2.0 * turn.sin());
+        add_light(&mut b, Light::Point { intensity: [3.0; 3] }, at, DVec3::NEG_Y);
+        lux += ball_irradiance(0.25 / at.length_squared(), at.normalize().y) * 3.0 / (PI * 0.25);
+    }
+    add_light(&mut b, Light::Directional { illuminance: [2.0; 3] }, DVec3::X, DVec3::NEG_X);
+    lux += 2.0 * ball_irradiance(f64::to_radians(10.0).sin().powi(2), 0.0) / (PI * f64::to_radians(10.0).sin().powi(2));
+    let case = Case::new("20 lights of 0.5 m and a sun, across the horizon", "LGT-06", b, lit(lux));
+    all.push(Case { light_radius: 0.5, sun_angle: 20.0, ..case }.model(1e-4));
     all
 }
 

@@ -123,6 +123,8 @@ pub fn shoot(case: &Case, run: &Settings) -> Result<Shots, RenderError> {
             max_bounces: case.max_bounces,
             filter: Filter { shape: FilterShape::Box, width: 1.0 },
             brdf: case.brdf,
+            light_radius: case.light_radius,
+            sun_angle: case.sun_angle,
             default_light: DefaultLight::Off,
             accel: run.accel,
             embree_dirs: run.embree_dirs.clone(),

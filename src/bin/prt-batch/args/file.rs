@@ -176,6 +176,21 @@ pub struct FileArgs {
     #[arg(long, value_name = "S", value_parser = parse::env_scale, allow_hyphen_values = true, help_heading = LIGHT)]
     pub env_scale: Option<f64>,
 
+    /// Point and spot lights are balls of this radius, metres
+    ///
+    /// What sees the whole ball gets as much light as without. From 1e-6 to 1e6, or 0 for no size. They hide nothing, what
+    /// is inside a ball gets none of its light, and the camera does not show them; mirrors and glass do, in scenes of at
+    /// most 256 lights with a place.
+    #[arg(long, value_name = "METRES", default_value = "0", value_parser = parse::light_radius)]
+    #[arg(allow_hyphen_values = true, help_heading = LIGHT)]
+    pub light_radius: f64,
+    /// Directional lights are suns of this angular diameter, degrees
+    ///
+    /// As --light-radius, in scenes of any number of lights; the sun is 0.53 wide. From 1e-4 to 180, or 0 for no size.
+    #[arg(long, value_name = "DEG", default_value = "0", value_parser = parse::sun_angle)]
+    #[arg(allow_hyphen_values = true, help_heading = LIGHT)]
+    pub sun_angle: f64,
+
     /// Output name from {stem} {parent} {camera} [default: {stem}, with .{camera} if a file has several]
     ///
     /// "/" in it makes sub-folders. {camera} is the camera's name made fit for a file (else its index), 0 for the one
