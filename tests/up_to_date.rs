@@ -251,7 +251,7 @@ fn files_that_are_not_of_the_scene_do_not_matter() {
 type Edit = fn(&mut Shot);
 
 /// What matters of both formats, by the option that is named then.
-const MATTERS: [(&str, Edit); 19] = [
+const MATTERS: [(&str, Edit); 20] = [
     ("size 64 wide -> 65 wide", |s| s.settings.size = PictureSize::Width(65)),
     ("size 64 wide -> 64x36", |s| s.settings.size = PictureSize::Exact(64, 36)),
     ("camera 0 -> 1", |s| s.camera = 1),
@@ -261,6 +261,7 @@ const MATTERS: [(&str, Edit); 19] = [
     ("frame 0 -> 1", |s| s.settings.render.frame = 1),
     ("max-bounces unlimited -> 0", |s| s.settings.render.max_bounces = Some(0)),
     ("cull-backfaces off -> on", |s| s.settings.render.cull_backfaces = true),
+    ("clamp none -> 2.5", |s| s.settings.render.clamp = Some(2.5)),
     ("texture-lod none -> on", |s| s.settings.render.texture_lod = true),
     ("filter tent:2 -> box:2", |s| s.settings.render.filter = Filter { shape: FilterShape::Box, width: 2.0 }),
     ("filter tent:2 -> tent:2.0000002", |s| {

@@ -33,6 +33,7 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.mrays_per_s = (stats.render_seconds > 0.0).then(|| total as f64 / stats.render_seconds * 1e-6);
     image.non_finite_samples = Some(stats.non_finite_samples);
     image.truncated = Some(stats.truncated);
+    image.energy_clamped = Some(stats.energy_clamped);
     image.estimated_error = stats.error.map(|ErrorEstimate { value, ci95 }| report::EstimatedError {
         metric: "sqrt-relmse".into(),
         value,
@@ -61,6 +62,9 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
         glowing_share: stats.default_light.emitted.glowing,
     });
     image.notes.extend(stats.default_light.note());
+    if stats.energy_clamped > 0.0 {
+        image.notes.push(format!("--clamp took {} of the light", report::percent(stats.energy_clamped)));
+    }
     image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
     image.warnings.extend(stats.warnings.iter().cloned());
     image.losses.extend(stats.losses.iter().cloned());

@@ -210,6 +210,7 @@ impl Wanted<'_> {
             max_bounces,
             cull_backfaces,
             texture_lod,
+            clamp,
             filter,
             brdf,
             default_light,
@@ -230,6 +231,9 @@ impl Wanted<'_> {
         set("frame", frame.to_string());
         set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
         // Named only where it is on: pictures without it have the fingerprints that they had before there was one.
+        if let Some(most) = clamp {
+            set("clamp", most.to_string());
+        }
         if *texture_lod {
             set("texture-lod", "on".into());
         }

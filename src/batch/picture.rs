@@ -101,6 +101,9 @@ fn attributes(
     if let Some(error) = stats.error {
         attributes.push(("prt:error", ExrValue::Double(error.value)));
     }
+    if let Some(most) = settings.clamp {
+        attributes.push(("prt:clamp", ExrValue::Double(most.into())));
+    }
     if settings.texture_lod {
         attributes.push(("prt:textureLod", ExrValue::Text("cones".into())));
     }
@@ -131,6 +134,9 @@ fn light_name(frame: &Frame) -> &'static str {
 /// What biases the picture and why; `no` if nothing does.
 fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> String {
     let mut reasons = Vec::new();
+    if let Some(most) = settings.clamp {
+        reasons.push(format!("indirect light is clamped at {most} nits (--clamp)"));
+    }
     if settings.texture_lod {
         reasons.push("textures are averaged over cones around the paths (--texture-lod)".into());
     }
@@ -217,6 +223,10 @@ mod tests {
         assert_eq!(bias_of(&frame, &settings, None), named);
         assert!(attributes(&frame, &settings, None, None).iter().any(|a| a.0 == "prt:textureLod"));
         settings.texture_lod = false;
+        settings.clamp = Some(2.5);
+        assert_eq!(bias_of(&frame, &settings, None), "indirect light is clamped at 2.5 nits (--clamp)");
+        assert!(attributes(&frame, &settings, None, None).contains(&("prt:clamp", ExrValue::Double(2.5))));
+        settings.clamp = None;
         settings.max_bounces = Some(3);
         frame.stats.non_finite_samples = 7;
         assert_eq!(

@@ -69,7 +69,7 @@ pub struct ImageReport {
     pub worst_tile: Option<WorstTile>,
     pub non_finite_samples: Option<u64>,
     pub truncated: Option<f64>,
-    /// Not built (`--clamp`).
+    /// Share of the picture's light that `--clamp` took; 0 without it.
     pub energy_clamped: Option<f64>,
     /// Null where the EXR's samples clip nothing.
     pub clipped_pixels: Option<u64>,

@@ -1,6 +1,7 @@
 //! Next event estimation: a light, a point on it, and a shadow ray on the side where that is.
 
 use super::SceneTables;
+use super::clamp::Limit;
 use super::closure::Closure;
 use super::interaction::Interaction;
 use super::medium::Crossing;
@@ -23,6 +24,8 @@ pub(super) struct Vertex<'a, L: Lanes> {
     pub start: V3<L>,
     /// Throughput.
     pub beta: V3<L>,
+    /// Of what light may bring.
+    pub limit: Option<Limit<L>>,
     /// Where the paths' radiance is.
     pub slot: L::U,
 }
@@ -37,7 +40,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
     u: [L::F; 4],
     scatters: L::M,
 ) -> (L::M, L::F) {
-    let Vertex { si, closure, crossing, receiver, start, beta, slot } = *vertex;
+    let Vertex { si, closure, crossing, receiver, start, beta, limit, slot } = *vertex;
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
@@ -59,6 +62,11 @@ pub(super) fn queue_light_sample<L: Lanes>(
             crossing.colored(arriving, through) * crossing.on_the_way(tables, light.is_distant, to_light, through);
     }
     let cast = sees & !broken & arriving.max_component().gt(zero);
+    if let Some(limit) = limit {
+        let (left, excess) = limit.apply(arriving);
+        excess.compress(cast, &mut pool.shadow_excess, pool.n_shadow);
+        arriving = left;
+    }
     let direction = light.wi.or_else(light.is_distant, to_light);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);
     pool.push_shadow::<L>(cast, (start, direction, t_max), slot, arriving);

@@ -3,6 +3,7 @@
 //! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
+mod clamp;
 mod closure;
 mod cone;
 mod coverage;
@@ -82,6 +83,8 @@ pub struct PathTracer<'a> {
     pub is_capped: bool,
     /// Whether camera rays pass single-sided surfaces from behind.
     pub cull_backfaces: bool,
+    /// What a contribution of indirect light is at most, cd/m^2 of its largest channel (`clamp.rs`); biased.
+    pub clamp: Option<f32>,
     /// Random numbers' seed.
     pub seed: u64,
     /// Frame number, part of the random numbers.

@@ -47,6 +47,8 @@ pub struct Counters {
     /// Crossings of volumes' boundaries that do not pair up: leaving what was not entered, being inside of something far
     /// from everything, being inside of more than a path remembers.
     pub unpaired: u64,
+    /// What `--clamp` took, all channels and paths together: cd/m^2.
+    pub taken: f64,
 }
 
 impl Counters {
@@ -57,12 +59,13 @@ impl Counters {
 
     /// Adds those of another worker.
     pub fn add(&mut self, other: &Self) {
-        let Self { camera, bounce, shadow, truncated, unpaired } = other;
+        let Self { camera, bounce, shadow, truncated, unpaired, taken } = other;
         self.camera += camera;
         self.bounce += bounce;
         self.shadow += shadow;
         self.truncated += truncated;
         self.unpaired += unpaired;
+        self.taken += taken;
     }
 }
 
@@ -84,7 +87,7 @@ impl PathTracer<'_> {
     /// it did before.
     pub fn trace(&self, unit: &Unit, worker: &mut Worker, sink: &mut impl SampleSink) {
         let Worker { pool, counters } = worker;
-        pool.fit(self.tables);
+        pool.fit(self.tables, self.clamp.is_some());
         let mut feed = Feed::new(unit);
         loop {
             let old = pool.n;
@@ -105,7 +108,9 @@ impl PathTracer<'_> {
                 let slot = pool.dead[i];
                 let radiance = std::mem::take(&mut pool.radiance[slot as usize]);
                 let (pixel, sample) = pool.origin[slot as usize];
+                let taken = pool.taken.get_mut(slot as usize).map_or(0.0, std::mem::take);
                 if radiance.iter().all(|r| r.is_finite()) {
+                    counters.taken += taken;
                     sink.add(pixel, sample, radiance);
                 } else {
                     sink.drop_non_finite(pixel, sample);
@@ -133,7 +138,11 @@ impl PathTracer<'_> {
         for i in 0..n_shadow {
             if pool.occluded[i] == 0 {
                 let [r, g, b] = &pool.shadow_radiance;
-                pool.add(pool.shadow_slot[i], [r[i], g[i], b[i]]);
+                let (slot, radiance) = (pool.shadow_slot[i], [r[i], g[i], b[i]]);
+                pool.add(slot, radiance);
+                if self.clamp.is_some() {
+                    pool.take(slot, radiance, pool.shadow_excess[i]);
+                }
             }
         }
     }

@@ -95,6 +95,8 @@ pub fn render_prepared(
     let spp = film.spp();
     let paths = window_tile.area() as u64 * u64::from(spp);
 
+    let shown = pixels.iter().flatten().map(|&channel| f64::from(channel)).sum::<f64>() * f64::from(spp);
+    let taken = totals.counters.taken;
     let features = features(scene, &prepared);
     let lanes = tracer.level.lanes();
     let mut warnings = prepared.warnings;
@@ -131,6 +133,7 @@ pub fn render_prepared(
         non_finite_samples: totals.non_finite,
         non_finite_examples: totals.examples,
         truncated: totals.counters.truncated as f64 / paths as f64,
+        energy_clamped: if taken > 0.0 { taken / (taken + shown) } else { 0.0 },
         error: errors.as_ref().map(|errors| errors.estimate),
         worst: errors.as_ref().map(Errors::worst),
         stopped_by,

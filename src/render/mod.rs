@@ -79,6 +79,8 @@ pub struct RenderStats {
     pub non_finite_examples: Vec<(u32, u32, u32)>,
     /// Share of paths ended by the bounce limit that is a safety cap (not by `--max-bounces`).
     pub truncated: f64,
+    /// Share of the picture's light that the clamp took, all channels together; 0 without one.
+    pub energy_clamped: f64,
     /// How far the picture is from that of endless samples; `None` with fewer than four samples a pixel, or if it is
     /// black.
     pub error: Option<crate::film::ErrorEstimate>,

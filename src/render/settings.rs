@@ -98,6 +98,8 @@ pub struct RenderSettings {
     pub cull_backfaces: bool,
     /// Textures are averaged over cones around the paths; biased.
     pub texture_lod: bool,
+    /// What a contribution of light is at most after two scatterings or more, cd/m^2 of its largest channel, above 0; biased.
+    pub clamp: Option<f32>,
     /// Pixel filter.
     pub filter: Filter,
     /// Microfacet model.
@@ -134,6 +136,7 @@ impl Default for RenderSettings {
             max_bounces: None,
             cull_backfaces: false,
             texture_lod: false,
+            clamp: None,
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),

@@ -134,6 +134,7 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         brdf: args.brdf,
         cull_backfaces: args.cull_backfaces,
         texture_lod: args.texture_lod,
+        clamp: args.clamp,
         default_light: args.default_light,
         accel: args.accel,
         embree_dirs: embree_dirs(),

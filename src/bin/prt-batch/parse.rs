@@ -84,6 +84,14 @@ pub fn env_scale(value: &str) -> Result<f64, String> {
     value.parse().ok().filter(inside).ok_or_else(|| "must be a factor from 0 to 1e9".into())
 }
 
+/// Nits.
+pub fn clamp(value: &str) -> Result<f32, String> {
+    let inside = |most: &f32| (1e-6..=1e12).contains(most);
+    value.parse().ok().filter(inside).ok_or_else(|| {
+        "must be nits from 1e-6 to 1e12, such as 10; without indirect light at all: --max-bounces 0".into()
+    })
+}
+
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
 }

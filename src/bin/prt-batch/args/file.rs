@@ -150,6 +150,13 @@ pub struct FileArgs {
     /// textures at any number. Emission and opacity are not.
     #[arg(long, help_heading = SAMPLING)]
     pub texture_lod: bool,
+    /// Most nits that indirect light brings at once (biased); what it takes is reported [default: off]
+    ///
+    /// From 1e-6 to 1e12. Each contribution of light after two scatterings or more is scaled down until its largest
+    /// channel is at most C; what the camera sees by itself and direct light on it are left alone. Ends fireflies, and
+    /// darkens the picture: the share of its light that was taken is energy_clamped of the JSON.
+    #[arg(long, value_name = "C", value_parser = parse::clamp, allow_hyphen_values = true, help_heading = SAMPLING)]
+    pub clamp: Option<f32>,
 
     /// Built-in studio light
     ///
