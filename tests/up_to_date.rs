@@ -104,7 +104,7 @@ impl Shot {
     fn fingerprint(&self) -> Fingerprint {
         let inputs = hash_sources(&self.scene().sources, &HashCache::default()).unwrap();
         let spp = self.ended.map_or(self.settings.render.spp, |(spp, _)| spp);
-        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs, spp))
+        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs, spp, None))
     }
 
     /// Writes files as a run would.

@@ -3,7 +3,7 @@
 use super::report::{self, Accel, ImageReport, Rays};
 use super::settings::FileSettings;
 use crate::film::{ErrorEstimate, Square};
-use crate::render::{AccelChoice, DefaultLight, Frame, StoppedBy, TargetReport};
+use crate::render::{AccelChoice, DefaultLight, Frame, SpreadReport, StoppedBy, TargetReport};
 use std::path::Path;
 
 /// The report of an image of which nothing is known but what was asked for.
@@ -42,6 +42,12 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.stopped_by = Some(stopped_by_name(stats.stopped_by).into());
     image.target_error = stats.target.map(|TargetReport { target, is_met, above, spp_needed: _ }| {
         report::TargetError { target, met: is_met, pixels_above: above }
+    });
+    image.adaptive = stats.spread.map(|SpreadReport { stage, least, most, gain, round: _ }| report::Adaptive {
+        stage,
+        least,
+        most,
+        gain,
     });
     image.worst_tile = stats.worst.map(|Square { pixels, error }| report::WorstTile {
         x: pixels.x,

@@ -5,7 +5,7 @@ use crate::camera::Projection;
 use crate::image::exr::{
     self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue,
 };
-use crate::render::{Brdf, Frame, RenderSettings};
+use crate::render::{Brdf, Frame, RenderSettings, SpreadReport};
 
 /// Which files, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +100,10 @@ fn attributes(
     ];
     if let Some(error) = stats.error {
         attributes.push(("prt:error", ExrValue::Double(error.value)));
+    }
+    if let Some(SpreadReport { stage, round, least, most, gain: _ }) = stats.spread {
+        let text = format!("{least} to {most} samples a pixel, by those of {stage}, round {round}");
+        attributes.push(("prt:adaptive", ExrValue::Text(text)));
     }
     if let Some(most) = settings.clamp {
         attributes.push(("prt:clamp", ExrValue::Double(most.into())));

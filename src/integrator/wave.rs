@@ -7,6 +7,7 @@ use crate::math::V3;
 use crate::sampler::{Key, coverage_key, dims, pixel_seed};
 use simd::{Float, Kernel, Lanes, Uint, dispatch_large};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Receives finished samples, in a fixed order for a fixed unit.
 pub trait SampleSink {
@@ -31,6 +32,8 @@ pub struct Unit {
     pub height: u32,
     /// Sample indices.
     pub samples: Range<u32>,
+    /// The pixels that are traced, row by row; `None`: all.
+    pub only: Option<Arc<[bool]>>,
 }
 
 /// Rays and events of one worker.
@@ -166,6 +169,10 @@ impl Feed {
         let mut n = start;
         // The film position's pixel goes into the ray's origin until the kernel below replaces it.
         while n < POOL && self.pixel < self.pixels {
+            if unit.only.as_ref().is_some_and(|only| !only[self.pixel as usize]) {
+                self.pixel += 1;
+                continue;
+            }
             let (x, y) = (unit.x + self.pixel % unit.width, unit.y + self.pixel / unit.width);
             let seed = pixel_seed(tracer.seed, tracer.frame, x, y);
             while n < POOL && self.sample < unit.samples.end {

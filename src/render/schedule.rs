@@ -94,7 +94,9 @@ pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Total
             }
             let (tile, samples) = wave.unit(i);
             let sums = TileSums::new(&tile, &samples);
-            let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples };
+            let only = wave.only(i);
+            let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples, only };
+            let before = worker.counters.total();
             let mut sink = Sink {
                 unit: &unit,
                 progress,
@@ -108,6 +110,7 @@ pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Total
             if progress.is_cancelled() {
                 break;
             }
+            sink.sums.add_rays(worker.counters.total() - before);
             wave.store(i, &sink.sums);
             non_finite += sink.non_finite;
             own.examples.extend(sink.examples.into_iter().map(|e| (i, e)));

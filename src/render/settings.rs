@@ -88,6 +88,8 @@ pub struct RenderSettings {
     pub spp: u32,
     /// What may end sampling before that.
     pub stopping: Stopping,
+    /// With a target of the error and no limit of time, pixels may get different numbers of samples.
+    pub adaptive: bool,
     /// Same seed, same pixels.
     pub seed: u64,
     /// Animation frame number; part of the random numbers.
@@ -131,6 +133,7 @@ impl Default for RenderSettings {
             crop: None,
             spp: 64,
             stopping: Stopping::default(),
+            adaptive: true,
             seed: 0,
             frame: 0,
             max_bounces: None,

@@ -135,6 +135,7 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         cull_backfaces: args.cull_backfaces,
         texture_lod: args.texture_lod,
         clamp: args.clamp,
+        adaptive: args.adaptive == parse::Adaptive::Auto,
         default_light: args.default_light,
         accel: args.accel,
         embree_dirs: embree_dirs(),

@@ -220,6 +220,17 @@ pub fn default_light() -> Words<DefaultLight> {
     Words::new(&[("auto", Auto), ("on", On), ("off", Off)], &[])
 }
 
+/// When samples may be spread unevenly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Adaptive {
+    Auto,
+    Off,
+}
+
+pub fn adaptive() -> Words<Adaptive> {
+    Words::new(&[("auto", Adaptive::Auto), ("off", Adaptive::Off)], &[])
+}
+
 pub fn brdf() -> Words<Brdf> {
     Words::new(&[("full", Brdf::Full), ("appendix-b", Brdf::AppendixB)], &[])
 }

@@ -113,6 +113,13 @@ pub struct FileArgs {
     #[arg(long, value_name = "TIME", value_parser = parse::duration, allow_hyphen_values = true)]
     #[arg(help_heading = SAMPLING)]
     pub time_limit: Option<Duration>,
+    /// Whether pixels may get different numbers of samples, with --target-error
+    ///
+    /// auto: where that is likely to save 30 % of the work, and without a limit of time; see "When sampling ends" below.
+    /// off: every pixel has as many.
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::adaptive())]
+    #[arg(help_heading = SAMPLING)]
+    pub adaptive: parse::Adaptive,
     /// Same seed, same pixels
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
     pub seed: u64,
