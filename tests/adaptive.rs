@@ -11,8 +11,6 @@ use support::pictures::{channel_means, settings, shoot};
 use support::scenes;
 use support::stats::Sample;
 
-const SEEDS: u64 = 64;
-
 fn options(size: u32, spp: u32, seed: u64) -> RenderSettings {
     RenderSettings { default_light: DefaultLight::Off, ..settings(size, spp, seed) }
 }
@@ -31,16 +29,16 @@ fn mean(frame: &Frame) -> f64 {
     channel_means(&frame.pixels).iter().sum::<f64>() / 3.0
 }
 
-/// Means over seeds 0..64 of pictures whose samples were spread and of as many even ones of other seeds, 4 standard
+/// Means over `seeds` of pictures whose samples were spread and of as many even ones of other seeds, 4 standard
 /// errors apart at most: false alarms 6e-5. `sharp`: what those errors may be at most, or the test says nothing.
 #[track_caller]
-fn assert_unbiased(scene: &Scene, size: u32, share: f64, sharp: f64) {
+fn assert_unbiased(scene: &Scene, seeds: u64, size: u32, share: f64, sharp: f64) {
     let stopping = until(scene, size, share);
-    let spread: Vec<Frame> = (0..SEEDS).map(|seed| shoot_until(scene, size, stopping, seed)).collect();
+    let spread: Vec<Frame> = (0..seeds).map(|seed| shoot_until(scene, size, stopping, seed)).collect();
     let used = spread.iter().filter(|frame| frame.stats.spread.is_some()).count();
-    assert!(used > SEEDS as usize / 3, "{used} pictures were spread");
+    assert!(used > seeds as usize / 3, "{used} pictures were spread");
     let spp = spread.iter().map(|frame| frame.spp).max().expect("there are pictures").next_power_of_two();
-    let even = (0..SEEDS).map(|seed| mean(&shoot(scene, &options(size, spp, seed + 500)))).collect::<Vec<_>>();
+    let even = (0..seeds).map(|seed| mean(&shoot(scene, &options(size, spp, seed + 500)))).collect::<Vec<_>>();
     let [a, b] = [spread.iter().map(mean).collect(), even].map(|means: Vec<f64>| Sample::of(&means));
     let se = (a.spread_of_mean().variance + b.spread_of_mean().variance).sqrt();
     println!("{used} spread, to {spp} at most: {} beside {}, standard error {se}", a.mean, b.mean);
@@ -103,12 +101,12 @@ fn thin_things() -> Scene {
 
 #[test]
 fn adp_01_spreading_samples_does_not_bias_rare_bright_pixels() {
-    assert_unbiased(&bright_spots(0.2), 24, 0.4, 1e-2);
+    assert_unbiased(&bright_spots(0.2), 64, 24, 0.4, 1e-2);
 }
 
 #[test]
 fn adp_03_spreading_samples_does_not_bias_partly_covered_pixels() {
-    assert_unbiased(&thin_things(), 40, 0.3, 5e-3);
+    assert_unbiased(&thin_things(), 24, 40, 0.3, 5e-3);
 }
 
 #[test]
