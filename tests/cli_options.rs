@@ -158,3 +158,27 @@ fn variant_shows_other_materials_and_is_part_of_what_makes_a_picture() {
     assert_eq!(output.status.code(), Some(3));
     assert!(stderr(&output).contains("there is no variant \"dusk\"") && stderr(&output).contains("Allowed: \"night\""));
 }
+
+#[test]
+fn what_a_clamp_takes_is_told() {
+    let room = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/reference/cornell/cornell.gltf");
+    let root = folder();
+    let run = |args: &[&str]| {
+        let common = [room, "--size", "16x16", "--spp", "16", "--accel", "bvh", "--no-png"];
+        let output = prt_in(root.path(), &[&common, args].concat());
+        let text = fs::read_to_string(root.path().join("renders/cornell.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        (stderr(&output), json, fs::read(root.path().join("renders/cornell.exr")).unwrap())
+    };
+    let has = |exr: &[u8], text: &str| exr.windows(text.len()).any(|window| window == text.as_bytes());
+    let (said, json, exr) = run(&[]);
+    assert_eq!(json["energy_clamped"], 0.0);
+    assert!(!said.contains("--clamp") && !has(&exr, "prt:clamp"), "{said}");
+    // Another picture, not an up-to-date one.
+    let (said, json, exr) = run(&["--clamp", "0.05"]);
+    let taken = json["energy_clamped"].as_f64().unwrap();
+    assert!(taken > 0.001 && taken < 0.9, "{taken}");
+    assert!(said.contains("--clamp took "), "{said}");
+    assert!(has(&exr, "prt:clamp") && has(&exr, "indirect light is clamped at 0.05 nits (--clamp)"));
+    assert_eq!(json["fingerprint"]["settings"]["clamp"], "0.05");
+}

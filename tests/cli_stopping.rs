@@ -247,3 +247,32 @@ fn a_signal_between_waves_ends_the_run_with_75() {
     assert_eq!((status.code(), asked.elapsed().as_secs() < 2), (Some(75), true));
     assert!(!root.path().join("renders/cornell.exr").exists());
 }
+
+#[test]
+fn samples_that_are_spread_are_told_of_and_the_same_command_gives_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let even = image(root.path(), &[TRIANGLE, "--default-light", "on", "--spp", "64", "--out", "even"], 0);
+    assert_eq!(even["adaptive"], Value::Null);
+    let target = format!("{:.4}", 0.5 * even["estimated_error"]["ci95"][1].as_f64().unwrap());
+    let common = [TRIANGLE, "--default-light", "on", "--aov", "samples", "--target-error", &target];
+    let run = |args: &[&str]| image(root.path(), &[&common, args].concat(), 0);
+    let first = run(&["--out", "a", "--threads", "1"]);
+    let number = |field: &str| first["adaptive"][field].as_f64().unwrap();
+    let spp = first["spp"].as_f64().unwrap();
+    assert!(number("stage") == 64.0 && number("gain") < 0.7, "{first}");
+    assert!(64.0 <= number("least") && number("least") < spp && spp < number("most"), "{first}");
+    assert_eq!(first["fingerprint"]["settings"]["adaptive"].as_str().map(|text| &text[..10]), Some("stage 64, "));
+    assert_eq!(run(&["--out", "b", "--threads", "3"])["adaptive"], first["adaptive"]);
+    let exr = |out: &str| fs::read(root.path().join(out).join("triangle.exr")).unwrap();
+    assert!(exr("a") == exr("b"));
+    // A mean number of samples is not that of every pixel.
+    assert_eq!(run(&["--out", "a"])["status"], "up-to-date");
+    let spp = first["spp"].to_string();
+    let fixed = image(root.path(), &[&common[..5], &["--spp", &spp, "--out", "a"]].concat(), 0);
+    assert_eq!((&fixed["status"], &fixed["adaptive"]), (&"rendered".into(), &Value::Null));
+    for even in [&["--adaptive", "off"][..], &["--time-limit", "1h"]] {
+        let found = run(&[&["--out", "b"], even].concat());
+        assert_eq!(found["adaptive"], Value::Null, "{even:?}");
+        assert_eq!(found["status"], if even[0] == "--adaptive" { "rendered" } else { "up-to-date" });
+    }
+}

@@ -104,7 +104,7 @@ impl Shot {
     fn fingerprint(&self) -> Fingerprint {
         let inputs = hash_sources(&self.scene().sources, &HashCache::default()).unwrap();
         let spp = self.ended.map_or(self.settings.render.spp, |(spp, _)| spp);
-        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs, spp))
+        self.with_wanted(|wanted| Fingerprint::new(wanted, inputs, spp, None))
     }
 
     /// Writes files as a run would.
@@ -251,7 +251,7 @@ fn files_that_are_not_of_the_scene_do_not_matter() {
 type Edit = fn(&mut Shot);
 
 /// What matters of both formats, by the option that is named then.
-const MATTERS: [(&str, Edit); 21] = [
+const MATTERS: [(&str, Edit); 22] = [
     ("size 64 wide -> 65 wide", |s| s.settings.size = PictureSize::Width(65)),
     ("size 64 wide -> 64x36", |s| s.settings.size = PictureSize::Exact(64, 36)),
     ("camera 0 -> 1", |s| s.camera = 1),
@@ -261,6 +261,7 @@ const MATTERS: [(&str, Edit); 21] = [
     ("frame 0 -> 1", |s| s.settings.render.frame = 1),
     ("max-bounces unlimited -> 0", |s| s.settings.render.max_bounces = Some(0)),
     ("cull-backfaces off -> on", |s| s.settings.render.cull_backfaces = true),
+    ("clamp none -> 2.5", |s| s.settings.render.clamp = Some(2.5)),
     ("texture-lod none -> on", |s| s.settings.render.texture_lod = true),
     ("light-radius none -> 0.25", |s| s.settings.render.light_radius = 0.25),
     ("sun-angle none -> 0.53", |s| s.settings.render.sun_angle = 0.53),

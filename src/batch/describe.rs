@@ -3,7 +3,7 @@
 use super::report::{self, Accel, ImageReport, Rays};
 use super::settings::FileSettings;
 use crate::film::{ErrorEstimate, Square};
-use crate::render::{AccelChoice, DefaultLight, Frame, StoppedBy, TargetReport};
+use crate::render::{AccelChoice, DefaultLight, Frame, SpreadReport, StoppedBy, TargetReport};
 use std::path::Path;
 
 /// The report of an image of which nothing is known but what was asked for.
@@ -33,6 +33,7 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.mrays_per_s = (stats.render_seconds > 0.0).then(|| total as f64 / stats.render_seconds * 1e-6);
     image.non_finite_samples = Some(stats.non_finite_samples);
     image.truncated = Some(stats.truncated);
+    image.energy_clamped = Some(stats.energy_clamped);
     image.estimated_error = stats.error.map(|ErrorEstimate { value, ci95 }| report::EstimatedError {
         metric: "sqrt-relmse".into(),
         value,
@@ -41,6 +42,12 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
     image.stopped_by = Some(stopped_by_name(stats.stopped_by).into());
     image.target_error = stats.target.map(|TargetReport { target, is_met, above, spp_needed: _ }| {
         report::TargetError { target, met: is_met, pixels_above: above }
+    });
+    image.adaptive = stats.spread.map(|SpreadReport { stage, least, most, gain, round: _ }| report::Adaptive {
+        stage,
+        least,
+        most,
+        gain,
     });
     image.worst_tile = stats.worst.map(|Square { pixels, error }| report::WorstTile {
         x: pixels.x,
@@ -61,6 +68,9 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
         glowing_share: stats.default_light.emitted.glowing,
     });
     image.notes.extend(stats.default_light.note());
+    if stats.energy_clamped > 0.0 {
+        image.notes.push(format!("--clamp took {} of the light", report::percent(stats.energy_clamped)));
+    }
     image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
     image.warnings.extend(stats.warnings.iter().cloned());
     image.losses.extend(stats.losses.iter().cloned());

@@ -15,7 +15,7 @@ use crate::camera::Camera;
 use crate::color::Exposure;
 use crate::image::exr::ExrOptions;
 use crate::load::LoadOptions;
-use crate::render::{CropWindow, Filter, Layers, RenderSettings, Stopping};
+use crate::render::{CropWindow, Filter, Layers, RenderSettings, SpreadReport, Stopping};
 use crate::scene::SourceFile;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -35,7 +35,7 @@ pub struct Fingerprint {
     pub pixels: String,
     /// Hash of everything that determines the bytes of the files.
     pub files: String,
-    /// What was asked for, as far as it matters; `spp` is what was reached.
+    /// What was asked for, as far as it matters; `spp` is what was reached, `adaptive` how samples were spread, if they were.
     pub settings: Settings,
     /// What was to end sampling, if not a number of samples alone.
     pub stopping: Option<StoppingRecord>,
@@ -118,10 +118,13 @@ impl CameraOrigin {
 }
 
 impl Fingerprint {
-    /// Of the image `wanted`, made from `inputs` with `spp` samples a pixel; outputs are added as they are written.
-    pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>, spp: u32) -> Self {
+    /// Of the image `wanted`, made from `inputs` with `spp` samples a pixel, spread so over the pixels; outputs are added as
+    /// they are written.
+    pub fn new(wanted: &Wanted, inputs: Vec<InputRecord>, spp: u32, spread: Option<SpreadReport>) -> Self {
         let FileSettings { files, render, .. } = wanted.settings;
-        let (pixel_settings, file_settings) = (wanted.pixel_settings(spp), file_settings(files, render.layers));
+        let spread = spread.map(|SpreadReport { stage, round, .. }| format!("stage {stage}, round {round}"));
+        let pixel_settings = wanted.pixel_settings(spp, spread.as_deref());
+        let file_settings = file_settings(files, render.layers);
         let pixels = hash_pixels(&pixel_settings, &inputs);
         Self {
             prt: crate::VERSION.into(),
@@ -149,8 +152,8 @@ impl Fingerprint {
 impl Wanted<'_> {
     /// Everything that determines the pixels but the bytes of the inputs. Structures are taken apart whole, so that a
     /// field that is added to one of them must be put here, or named as one that changes no pixel. With `spp` samples a
-    /// pixel, which is what is asked for unless something else ends sampling.
-    pub fn pixel_settings(&self, spp: u32) -> Settings {
+    /// pixel, which is what is asked for unless something else ends sampling, and how they are spread unevenly.
+    pub fn pixel_settings(&self, spp: u32, adaptive: Option<&str>) -> Settings {
         let Self { input, settings, origin, environment, camera, batch_time_limit: _ } = *self;
         // Names of files change no pixel; which cameras, which environment and from where is said by `origin`, `camera` and
         // `environment`; `files` comes after the pixels.
@@ -205,11 +208,14 @@ impl Wanted<'_> {
             spp: _,
             // Only how many samples there are in the end.
             stopping: _,
+            // How samples were spread is known when they were.
+            adaptive: _,
             seed,
             frame,
             max_bounces,
             cull_backfaces,
             texture_lod,
+            clamp,
             filter,
             brdf,
             default_light,
@@ -228,10 +234,16 @@ impl Wanted<'_> {
         let whole = || "whole".into();
         set("crop", crop.map_or_else(whole, |CropWindow { x, y, width, height }| format!("{x},{y},{width},{height}")));
         set("spp", spp.to_string());
+        if let Some(adaptive) = adaptive {
+            set("adaptive", adaptive.into());
+        }
         set("seed", seed.to_string());
         set("frame", frame.to_string());
         set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
         // Named only where they are on: pictures without them have the fingerprints that they had before there were any.
+        if let Some(most) = clamp {
+            set("clamp", most.to_string());
+        }
         if *texture_lod {
             set("texture-lod", "on".into());
         }

@@ -5,7 +5,7 @@ use crate::camera::Projection;
 use crate::image::exr::{
     self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue,
 };
-use crate::render::{Brdf, Frame, RenderSettings};
+use crate::render::{Brdf, Frame, RenderSettings, SpreadReport};
 
 /// Which files, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +101,13 @@ fn attributes(
     if let Some(error) = stats.error {
         attributes.push(("prt:error", ExrValue::Double(error.value)));
     }
+    if let Some(SpreadReport { stage, round, least, most, gain: _ }) = stats.spread {
+        let text = format!("{least} to {most} samples a pixel, by those of {stage}, round {round}");
+        attributes.push(("prt:adaptive", ExrValue::Text(text)));
+    }
+    if let Some(most) = settings.clamp {
+        attributes.push(("prt:clamp", ExrValue::Double(most.into())));
+    }
     if settings.texture_lod {
         attributes.push(("prt:textureLod", ExrValue::Text("cones".into())));
     }
@@ -136,6 +143,9 @@ fn light_name(frame: &Frame) -> &'static str {
 /// What biases the picture and why; `no` if nothing does.
 fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> String {
     let mut reasons = Vec::new();
+    if let Some(most) = settings.clamp {
+        reasons.push(format!("indirect light is clamped at {most} nits (--clamp)"));
+    }
     if settings.texture_lod {
         reasons.push("textures are averaged over cones around the paths (--texture-lod)".into());
     }
@@ -225,6 +235,11 @@ mod tests {
         settings.sun_angle = 0.5;
         assert_eq!(bias_of(&frame, &settings, None), "no", "another scene, not a bias");
         assert!(attributes(&frame, &settings, None, None).iter().any(|a| a.0 == "prt:sunAngle"));
+        settings.sun_angle = 0.0;
+        settings.clamp = Some(2.5);
+        assert_eq!(bias_of(&frame, &settings, None), "indirect light is clamped at 2.5 nits (--clamp)");
+        assert!(attributes(&frame, &settings, None, None).contains(&("prt:clamp", ExrValue::Double(2.5))));
+        settings.clamp = None;
         settings.max_bounces = Some(3);
         frame.stats.non_finite_samples = 7;
         assert_eq!(

@@ -65,11 +65,13 @@ pub struct ImageReport {
     pub stopped_by: Option<String>,
     /// Null without `--target-error`.
     pub target_error: Option<TargetError>,
+    /// Null where every pixel has as many samples.
+    pub adaptive: Option<Adaptive>,
     /// Null where `estimated_error` is.
     pub worst_tile: Option<WorstTile>,
     pub non_finite_samples: Option<u64>,
     pub truncated: Option<f64>,
-    /// Not built (`--clamp`).
+    /// Share of the picture's light that `--clamp` took; 0 without it.
     pub energy_clamped: Option<f64>,
     /// Null where the EXR's samples clip nothing.
     pub clipped_pixels: Option<u64>,
@@ -167,6 +169,16 @@ pub struct TargetError {
     pub met: bool,
     /// Share of the pixels; null for black pictures.
     pub pixels_above: Option<f64>,
+}
+
+/// Samples that are not as many in every pixel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Adaptive {
+    pub stage: u32,
+    pub least: u32,
+    pub most: u32,
+    pub gain: f64,
 }
 
 /// The part of the picture that is worst off.

@@ -154,7 +154,8 @@ pub fn check(json: &Path, wanted: &Wanted, cache: &HashCache) -> Result<Kept, Wh
     // What was reached; nobody asks for none.
     let spp = then.settings.get("spp").and_then(|spp| spp.parse().ok()).unwrap_or(0);
     check_stopping(spp, &report, then, wanted)?;
-    let (pixel_settings, file_settings) = (wanted.pixel_settings(spp), file_settings(&files, render.layers));
+    let adaptive = then.settings.get("adaptive").map(String::as_str);
+    let (pixel_settings, file_settings) = (wanted.pixel_settings(spp, adaptive), file_settings(&files, render.layers));
     compare(&then.settings, &pixel_settings, &file_settings)?;
     let outputs: Vec<_> = kinds.map(|kind| json.with_extension(kind)).collect();
     let record = |path: &Path| then.outputs.iter().find(|o| path.extension().is_some_and(|e| *e == *o.kind));
@@ -176,6 +177,7 @@ fn check_stopping(spp: u32, report: &ImageReport, then: &Fingerprint, wanted: &W
     let fixed = |spp| StoppingRecord { spp, target_error: None, time_limit: None, batch_time_limit: None };
     let is_open = wanted.stopping().is_some();
     let now = wanted.stopping().unwrap_or_else(|| fixed(wanted.settings.render.spp));
+    let adaptive = then.settings.get("adaptive");
     // However it was ended: the samples are what counts.
     let then = then.stopping.clone().filter(|_| is_open).unwrap_or_else(|| fixed(spp));
     let has_target = then.target_error == now.target_error;
@@ -183,7 +185,11 @@ fn check_stopping(spp: u32, report: &ImageReport, then: &Fingerprint, wanted: &W
     let was_good = now.target_error.is_some() && report.stopped_by.as_deref() == Some("target-error");
     let is_good = was_good && has_target && spp <= now.spp;
     if has_all || is_good {
-        return Ok(());
+        // A mean number of samples is not that of each pixel.
+        return match adaptive.filter(|_| !(is_open && has_target && wanted.settings.render.adaptive)) {
+            Some(_) => Err(Why::Setting { key: "adaptive".into(), then: adaptive.cloned(), now: None }),
+            None => Ok(()),
+        };
     }
     let text = |value: Option<f64>| value.map(|value| value.to_string());
     let seconds = |value: Option<f64>| value.map(|value| format!("{value}s"));

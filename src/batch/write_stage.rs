@@ -114,7 +114,7 @@ impl WriteStage {
         match sources.records() {
             Ok(inputs) => {
                 let wanted = self.shared.wanted(task, *camera);
-                image.fingerprint = Some(Fingerprint::new(&wanted, inputs.clone(), frame.spp));
+                image.fingerprint = Some(Fingerprint::new(&wanted, inputs.clone(), frame.spp, frame.stats.spread));
             }
             Err(changed) => {
                 image.warnings.push(format!("{changed}; this picture will not be taken for up to date"));

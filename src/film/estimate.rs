@@ -13,7 +13,7 @@ use super::{BLOCKS, Film, Rounded, Tile};
 use rayon::prelude::*;
 
 /// Weight of the squared mean luminance in the denominator of relMSE, as in `compare`.
-const MEAN_WEIGHT: f64 = 0.01;
+pub(super) const MEAN_WEIGHT: f64 = 0.01;
 /// Half the mean square difference of two halves of a net, in the fast part of a half: 2 - 2^-0.5. They are correlated
 /// by c = 2^-0.5 - 1, as the whole net's fast part is 2^-1.5 of a half's.
 const FAST_PAIR: f64 = 1.292_893;
@@ -105,6 +105,7 @@ struct Variance {
     slow: f64,
     fast: f64,
     half: f64,
+    is_uneven: bool,
     /// Logarithm of the factor by which halves and quarters disagree beyond what the model allows.
     doubt: f64,
 }
@@ -113,6 +114,9 @@ impl Variance {
     /// Of `spp` samples.
     fn at(&self, spp: u32) -> f64 {
         let n = f64::from(spp);
+        if self.is_uneven {
+            return self.smooth(n);
+        }
         self.slow * self.half / n + self.fast * self.half.powf(1.5) * net(spp) / (n * n)
     }
 
@@ -137,8 +141,10 @@ fn net(mut spp: u32) -> f64 {
 /// Which blocks of a film are held against each other.
 #[derive(Clone, Copy, Debug)]
 struct Halves {
-    /// Samples in a half of the greatest net.
-    size: u32,
+    /// Samples in a half of the greatest net; in that of a mean pixel where they are spread unevenly.
+    size: f64,
+    /// They are.
+    is_uneven: bool,
     /// The half that follows the net is there.
     has_third: bool,
     /// Of `Differences::halves` in the fast part of a half.
@@ -146,12 +152,18 @@ struct Halves {
 }
 
 impl Halves {
+    /// Of pixels that have each two halves of their own: what the variance of their means is does not depend on how many
+    /// samples these have.
+    fn of_uneven(mean: u32) -> Self {
+        Self { size: 0.5 * f64::from(mean), is_uneven: true, has_third: false, fast: FAST_PAIR }
+    }
+
     /// Of a film with `spp` samples; `None` with fewer than four.
     fn of(spp: u32) -> Option<Self> {
         let whole = 1 << spp.checked_ilog2()?;
         let has_third = spp >= whole + whole / 2;
         let fast = if has_third { 0.5 * (FAST_PAIR + FAST_THIRD) } else { FAST_PAIR };
-        (spp >= BLOCKS).then_some(Self { size: whole / 2, has_third, fast })
+        (spp >= BLOCKS).then_some(Self { size: f64::from(whole / 2), is_uneven: false, has_third, fast })
     }
 
     /// Those of one channel of a pixel.
@@ -174,9 +186,9 @@ impl Halves {
     /// Beyond what the model allows, the mean (of logarithms) of what halves and what quarters say: the variance of smooth
     /// light falls in steps, at every other power of two, so that either alone is up to three times off.
     fn variance(&self, found: Differences) -> Variance {
-        let half = f64::from(self.size);
+        let (half, is_uneven) = (self.size, self.is_uneven);
         if found.halves <= 0.0 && found.quarters <= 0.0 {
-            return Variance { slow: 0.0, fast: 0.0, half, doubt: 0.0 };
+            return Variance { slow: 0.0, fast: 0.0, half, is_uneven, doubt: 0.0 };
         }
         // A difference of sums may be just below nothing.
         let [halves, quarters] = [found.halves, found.quarters].map(|d| d.max(f64::MIN_POSITIVE));
@@ -184,15 +196,15 @@ impl Halves {
         let [all_slow, all_fast] = [2.0 * halves, 8.0_f64.sqrt() * FAST_PAIR / self.fast * halves];
         if quarters > all_fast {
             let doubt = (quarters / all_fast).min(MOST_DOUBT);
-            return Variance { slow: 0.0, fast: halves / self.fast * doubt.sqrt(), half, doubt: doubt.ln() };
+            return Variance { slow: 0.0, fast: halves / self.fast * doubt.sqrt(), half, is_uneven, doubt: doubt.ln() };
         }
         if quarters < all_slow {
             let doubt = (all_slow / quarters).min(MOST_DOUBT);
-            return Variance { slow: halves / doubt.sqrt(), fast: 0.0, half, doubt: doubt.ln() };
+            return Variance { slow: halves / doubt.sqrt(), fast: 0.0, half, is_uneven, doubt: doubt.ln() };
         }
         let fast = (quarters - all_slow) / (8.0_f64.sqrt() * FAST_PAIR - 2.0 * self.fast);
         let fast = fast.min(halves / self.fast);
-        Variance { slow: halves - self.fast * fast, fast, half, doubt: 0.0 }
+        Variance { slow: halves - self.fast * fast, fast, half, is_uneven, doubt: 0.0 }
     }
 
     /// The variance of the mean of `spp` samples of one channel of a pixel, by so few differences that only the slow part
@@ -201,7 +213,7 @@ impl Halves {
         // Weighted by how many differences are in them.
         let n = if self.has_third { 2.0 } else { 1.0 };
         let slow = (n * found.halves + found.quarters) / (n + 2.0);
-        slow * f64::from(self.size) / f64::from(spp)
+        slow * self.size / f64::from(spp)
     }
 }
 
@@ -235,7 +247,7 @@ impl Film {
     /// The estimated errors of `pixels`, which are [`Film::mean`]; `None` with fewer than four samples, or where nothing
     /// was seen but black.
     pub fn errors(&self, pixels: &[[f32; 3]]) -> Option<Errors> {
-        let halves = Halves::of(self.spp)?;
+        let halves = self.halves()?;
         let count = pixels.len() as f64;
         let mean = pixels.iter().map(grey).sum::<f64>() / count;
         if !mean.is_finite() || mean <= 0.0 {
@@ -279,6 +291,11 @@ impl Film {
             variance: halves.variance(relative),
             reach,
         })
+    }
+
+    /// What is held against each other.
+    fn halves(&self) -> Option<Halves> {
+        if self.uneven.is_some() { Some(Halves::of_uneven(self.spp)) } else { Halves::of(self.spp) }
     }
 
     /// The squares of the window, row by row, and what is summed of each; `mean` is that of `pixels`.
@@ -327,7 +344,7 @@ impl Film {
     /// The variance of each channel of [`Film::mean`], estimated on the safe side; infinite where there is one sample.
     pub fn variance(&self) -> Vec<[f32; 3]> {
         let mut variance = vec![[0.0; 3]; self.window.area()];
-        let halves = Halves::of(self.spp);
+        let halves = self.halves();
         self.each_pixel(|at, blocks| {
             variance[at] = [0, 1, 2].map(|channel| match halves {
                 Some(halves) => halves.safe_variance(halves.differences(blocks, channel), self.spp) as f32,
@@ -362,7 +379,7 @@ fn squares(tile: &Tile) -> impl Iterator<Item = Tile> + use<> {
     })
 }
 
-fn grey(pixel: &[f32; 3]) -> f64 {
+pub(super) fn grey(pixel: &[f32; 3]) -> f64 {
     pixel.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
 }
 

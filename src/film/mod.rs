@@ -9,8 +9,10 @@
 
 pub mod blocks;
 mod estimate;
+mod spread;
 
 pub use estimate::{ErrorEstimate, Errors, Square};
+pub use spread::Spread;
 
 use rayon::prelude::*;
 use std::ops::Range;
@@ -51,6 +53,8 @@ pub struct TileSums {
     leaves: u32,
     /// Per pixel, row by row, and leaf: R, G, B and the number of samples in them.
     sums: Vec<([Sum; 3], u32)>,
+    /// Rays that it took.
+    rays: u64,
 }
 
 /// A sum whose rounding errors are kept beside it (Knuth's two-sum): 106 bits, so that the order of additions does not
@@ -91,7 +95,7 @@ impl TileSums {
         let first = blocks::leaf(block.start);
         let leaves = blocks::leaf(block.end - 1) - first + 1;
         let sums = vec![([Sum::default(); 3], 0); tile.area() * leaves as usize];
-        Self { block: block.clone(), first, leaves, sums }
+        Self { block: block.clone(), first, leaves, sums, rays: 0 }
     }
 
     /// Adds the finite sample `sample` of the block to pixel `pixel` (row by row in the tile).
@@ -103,6 +107,11 @@ impl TileSums {
             s.add(f64::from(r));
         }
         *count += 1;
+    }
+
+    /// Notes how many rays it took.
+    pub fn add_rays(&mut self, rays: u64) {
+        self.rays += rays;
     }
 
     /// The sums of the whole block.
@@ -121,7 +130,12 @@ impl TileSums {
 #[derive(Debug)]
 pub struct Film {
     tiles: Arc<[Tile]>,
+    /// Samples a pixel; the mean, rounded, once they are spread unevenly.
     spp: u32,
+    /// Then those of each pixel of the window: powers of two, four blocks each.
+    uneven: Option<Vec<u32>>,
+    /// Rays so far, by tile.
+    rays: Vec<u64>,
     /// Those of [`blocks::layout`], each with the sums of every tile.
     blocks: Vec<(Range<u32>, Vec<Rounded>)>,
     window: Tile,
@@ -131,14 +145,29 @@ pub struct Film {
 #[derive(Debug)]
 pub struct Wave {
     tiles: Arc<[Tile]>,
-    /// Samples a pixel when it is done.
-    to: u32,
-    blocks: Vec<Range<u32>>,
-    /// `[block][tile]`.
-    sums: Vec<OnceLock<Rounded>>,
+    /// Samples a pixel when it is done; `None` where only some pixels go on.
+    to: Option<u32>,
+    /// The units: block by block all tiles, or two blocks each of some pixels of a tile.
+    parts: Vec<Part>,
+    /// Of each unit and the pixels that it is about, with the rays that it took.
+    sums: Vec<OnceLock<(Rounded, u64)>>,
+}
+
+/// A unit of work.
+#[derive(Debug)]
+struct Part {
+    tile: usize,
+    block: Range<u32>,
+    /// The pixels of the tile that it is about, row by row; `None`: all.
+    only: Option<Arc<[bool]>>,
 }
 
 impl Wave {
+    fn new(tiles: Arc<[Tile]>, to: Option<u32>, parts: Vec<Part>) -> Self {
+        let sums = parts.iter().map(|_| OnceLock::new()).collect();
+        Self { tiles, to, parts, sums }
+    }
+
     /// Units of work: (tile, block) pairs.
     pub fn units(&self) -> usize {
         self.sums.len()
@@ -146,7 +175,21 @@ impl Wave {
 
     /// The tile and the samples of unit `i`; the first block of all tiles comes first.
     pub fn unit(&self, i: usize) -> (Tile, Range<u32>) {
-        (self.tiles[i % self.tiles.len()], self.blocks[i / self.tiles.len()].clone())
+        let Part { tile, block, .. } = &self.parts[i];
+        (self.tiles[*tile], block.clone())
+    }
+
+    /// The pixels of its tile that unit `i` is about, row by row; `None`: all.
+    pub fn only(&self, i: usize) -> Option<Arc<[bool]>> {
+        self.parts[i].only.clone()
+    }
+
+    /// The units in order with their sums and rays.
+    fn into_sums(self) -> impl Iterator<Item = (Part, Rounded, u64)> {
+        self.parts.into_iter().zip(self.sums).map(|(part, sums)| {
+            let (sums, rays) = sums.into_inner().expect("every unit was rendered");
+            (part, sums, rays)
+        })
     }
 
     /// Stores the sums of unit `i`.
@@ -154,7 +197,11 @@ impl Wave {
     /// # Panics
     /// When it was stored before: two workers took one unit.
     pub fn store(&self, i: usize, sums: &TileSums) {
-        assert!(self.sums[i].set(sums.rounded()).is_ok(), "each unit is rendered once");
+        let mut rounded = sums.rounded();
+        if let Some(only) = &self.parts[i].only {
+            rounded = rounded.iter().zip(only.iter()).filter_map(|(sums, is_in)| is_in.then_some(*sums)).collect();
+        }
+        assert!(self.sums[i].set((rounded, sums.rays)).is_ok(), "each unit is rendered once");
     }
 }
 
@@ -178,10 +225,11 @@ impl Film {
             }
             y += height;
         }
-        Self { tiles: tiles.into(), spp: 0, blocks: Vec::new(), window }
+        let rays = vec![0; tiles.len()];
+        Self { tiles: tiles.into(), spp: 0, uneven: None, rays, blocks: Vec::new(), window }
     }
 
-    /// Samples a pixel that it holds.
+    /// Samples a pixel that it holds; the mean, rounded, where they are spread unevenly.
     pub fn spp(&self) -> u32 {
         self.spp
     }
@@ -192,9 +240,10 @@ impl Film {
     /// When there are as many already, or the film ends where it cannot go on ([`blocks::is_end`]).
     pub fn wave(&self, to: u32) -> Wave {
         assert!(to > self.spp && blocks::is_end(self.spp), "films go on from the end of a block");
-        let blocks = blocks::beyond(self.spp, to);
-        let sums = (0..self.tiles.len() * blocks.len()).map(|_| OnceLock::new()).collect();
-        Wave { tiles: Arc::clone(&self.tiles), to, blocks, sums }
+        assert!(self.uneven.is_none(), "what is spread goes on so");
+        let all =
+            |block: Range<u32>| (0..self.tiles.len()).map(move |tile| Part { tile, block: block.clone(), only: None });
+        Wave::new(Arc::clone(&self.tiles), Some(to), blocks::beyond(self.spp, to).into_iter().flat_map(all).collect())
     }
 
     /// Takes in what a wave of this film brought.
@@ -202,15 +251,20 @@ impl Film {
     /// # Panics
     /// When a unit is missing.
     pub fn take(&mut self, wave: Wave) {
-        let mut sums = wave.sums.into_iter().map(|sums| sums.into_inner().expect("every unit was rendered"));
-        let tiles = self.tiles.len();
-        self.blocks.extend(wave.blocks.into_iter().map(|block| (block, sums.by_ref().take(tiles).collect())));
+        let Some(to) = wave.to else { return self.take_uneven(wave) };
+        for (Part { tile, block, .. }, sums, rays) in wave.into_sums() {
+            self.rays[tile] += rays;
+            match self.blocks.last_mut() {
+                Some((last, tiles)) if *last == block => tiles.push(sums),
+                _ => self.blocks.push((block, vec![sums])),
+            }
+        }
         let join = |sums: &mut Vec<Rounded>, other: Vec<Rounded>| {
             sums.par_iter_mut().zip(other).for_each(|(sums, other)| add_all(sums, &other));
         };
-        let layout = blocks::layout(wave.to).into_iter();
+        let layout = blocks::layout(to).into_iter();
         self.blocks = layout.map(|block| (block.clone(), blocks::joined(&block, &mut self.blocks, &join))).collect();
-        self.spp = wave.to;
+        self.spp = to;
     }
 
     /// The mean of each pixel of the window, row by row; 0 where no sample survived.
@@ -233,17 +287,21 @@ impl Film {
         counts
     }
 
+    /// The place in the window of pixel `i` of `tile`.
+    fn place(&self, tile: &Tile, i: usize) -> usize {
+        let (x, y) = (tile.x - self.window.x, tile.y - self.window.y);
+        let (across, down) = (i % tile.width as usize, i / tile.width as usize);
+        (y as usize + down) * self.window.width as usize + x as usize + across
+    }
+
     /// Calls `with` for each pixel of the window, by its place in it, with its sums over the film's blocks.
     fn each_pixel(&self, mut with: impl FnMut(usize, &[[f32; 4]])) {
         let mut blocks = Vec::with_capacity(self.blocks.len());
         for (t, tile) in self.tiles.iter().enumerate() {
-            let first =
-                (tile.y - self.window.y) as usize * self.window.width as usize + (tile.x - self.window.x) as usize;
             for i in 0..tile.area() {
                 blocks.clear();
                 blocks.extend(self.blocks.iter().map(|(_, tiles)| tiles[t][i]));
-                let (x, y) = (i % tile.width as usize, i / tile.width as usize);
-                with(first + y * self.window.width as usize + x, &blocks);
+                with(self.place(tile, i), &blocks);
             }
         }
     }

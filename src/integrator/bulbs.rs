@@ -1,11 +1,12 @@
 //! Shadow rays towards bulbs (`light/bulb.rs`): what they meet first, and what that sends back if it is the bulb.
 
+use super::PathTracer;
+use super::clamp::{Limit, add_limited};
 use super::emission::shining;
 use super::interaction::interact;
 use super::pool::{PathPool, ROOM};
-use super::shade::{add_lanes, load3};
+use super::shade::load3;
 use super::wave::Counters;
-use super::{PathTracer, SceneTables};
 use crate::accel::{HitBatch, MISS, RayBatch};
 use crate::math::V3;
 use simd::{Buffer, Float, Kernel, Lanes, Mask, Uint, dispatch_large};
@@ -23,6 +24,8 @@ pub struct BulbRays {
     sought: Buffer<u32>,
     /// The medium that they go through.
     medium: Buffer<u32>,
+    /// How many scatterings their light has behind it.
+    scatterings: Buffer<u32>,
     /// Whom they light.
     slot: Buffer<u32>,
 }
@@ -36,6 +39,7 @@ impl Default for BulbRays {
             weight: std::array::from_fn(|_| Buffer::new(ROOM)),
             sought: Buffer::new(ROOM),
             medium: Buffer::new(ROOM),
+            scatterings: Buffer::new(ROOM),
             slot: Buffer::new(ROOM),
         }
     }
@@ -54,6 +58,8 @@ pub struct BulbRay<L: Lanes> {
     pub sought: L::U,
     /// The medium that it goes through.
     pub medium: L::U,
+    /// How many scatterings its light has behind it.
+    pub scatterings: L::U,
     /// Whom it lights.
     pub slot: L::U,
 }
@@ -63,7 +69,7 @@ impl BulbRays {
     #[inline(always)]
     pub fn push<L: Lanes>(&mut self, keep: L::M, ray: &BulbRay<L>) {
         let to = self.n;
-        let BulbRay { origin, direction, t_max, weight, sought, medium, slot } = *ray;
+        let BulbRay { origin, direction, t_max, weight, sought, medium, scatterings, slot } = *ray;
         origin.x.compress(keep, &mut self.rays.ox, to);
         origin.y.compress(keep, &mut self.rays.oy, to);
         origin.z.compress(keep, &mut self.rays.oz, to);
@@ -76,6 +82,7 @@ impl BulbRays {
         weight.z.compress(keep, &mut self.weight[2], to);
         sought.compress(keep, &mut self.sought, to);
         medium.compress(keep, &mut self.medium, to);
+        scatterings.compress(keep, &mut self.scatterings, to);
         slot.compress(keep, &mut self.slot, to);
         self.n += keep.count();
     }
@@ -88,34 +95,35 @@ impl PathTracer<'_> {
         let Some(mut bulbs) = pool.bulbs.take() else { return };
         counters.shadow += bulbs.n as u64;
         self.accel.intersect(&bulbs.rays, 0..bulbs.n, false, &mut bulbs.hits);
-        dispatch_large(self.level, Arrive { tables: self.tables, pool: &mut *pool, bulbs: &bulbs });
+        dispatch_large(self.level, Arrive { tracer: self, pool: &mut *pool, bulbs: &bulbs });
         bulbs.n = 0;
         pool.bulbs = Some(bulbs);
     }
 }
 
 /// Adds what has been met.
-struct Arrive<'a> {
-    tables: &'a SceneTables,
+struct Arrive<'a, 't> {
+    tracer: &'a PathTracer<'t>,
     pool: &'a mut PathPool,
     bulbs: &'a BulbRays,
 }
 
-impl Kernel for Arrive<'_> {
+impl Kernel for Arrive<'_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { tables, pool, bulbs } = self;
+        let Self { tracer, pool, bulbs } = self;
         for at in (0..bulbs.n).step_by(L::N) {
-            arrive::<L>(tables, pool, bulbs, at, L::M::first(bulbs.n - at));
+            arrive::<L>(tracer, pool, bulbs, at, L::M::first(bulbs.n - at));
         }
     }
 }
 
 /// The rays `at ..` in the lanes of `active`.
 #[inline(always)]
-fn arrive<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, bulbs: &BulbRays, at: usize, active: L::M) {
+fn arrive<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, bulbs: &BulbRays, at: usize, active: L::M) {
+    let tables = tracer.tables;
     let primitive = L::U::load(&bulbs.hits.primitive, at);
     let hit = active & !primitive.eq(L::U::splat(MISS));
     if !hit.any() {
@@ -133,5 +141,6 @@ fn arrive<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, bulbs: &BulbRays,
         let distance = L::F::load(&bulbs.hits.t, at);
         arriving = arriving * tables.media.transmittance(L::U::load(&bulbs.medium, at), distance);
     }
-    add_lanes::<L>(pool, L::U::load(&bulbs.slot, at), arriving, lit);
+    let limit = Limit::<L>::new(tracer.clamp, L::U::load(&bulbs.scatterings, at));
+    add_limited::<L>(limit, pool, L::U::load(&bulbs.slot, at), arriving, lit);
 }

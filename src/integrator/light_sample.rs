@@ -2,6 +2,7 @@
 
 use super::SceneTables;
 use super::bulbs::BulbRay;
+use super::clamp::Limit;
 use super::closure::Closure;
 use super::interaction::Interaction;
 use super::medium::Crossing;
@@ -26,6 +27,10 @@ pub(super) struct Vertex<'a, L: Lanes> {
     pub start: V3<L>,
     /// Throughput.
     pub beta: V3<L>,
+    /// How many scatterings light has behind it that arrives from here.
+    pub scatterings: L::U,
+    /// Of what such light may bring.
+    pub limit: Option<Limit<L>>,
     /// Where the paths' radiance is.
     pub slot: L::U,
 }
@@ -50,7 +55,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
     u: [L::F; 4],
     scatters: L::M,
 ) -> Queued<L> {
-    let Vertex { si, closure, crossing, receiver, start, beta, slot } = *vertex;
+    let Vertex { si, closure, crossing, receiver, start, beta, scatterings, limit, slot } = *vertex;
     let (zero, one) = (L::F::zero(), L::F::one());
     let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
@@ -83,8 +88,22 @@ pub(super) fn queue_light_sample<L: Lanes>(
         let (direction, t_max) = (light.wi, light.reach);
         bulbs.push(
             sought,
-            &BulbRay { origin: start, direction, t_max, weight: arriving, sought: light.sought, medium, slot },
+            &BulbRay {
+                origin: start,
+                direction,
+                t_max,
+                weight: arriving,
+                sought: light.sought,
+                medium,
+                scatterings,
+                slot,
+            },
         );
+    }
+    if let Some(limit) = limit {
+        let (left, excess) = limit.apply(arriving);
+        excess.compress(cast, &mut pool.shadow_excess, pool.n_shadow);
+        arriving = left;
     }
     let direction = light.wi.or_else(light.is_distant, to_light);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);

@@ -4,6 +4,7 @@
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
 mod bulbs;
+mod clamp;
 mod closure;
 mod cone;
 mod coverage;
@@ -84,6 +85,8 @@ pub struct PathTracer<'a> {
     pub is_capped: bool,
     /// Whether camera rays pass single-sided surfaces from behind.
     pub cull_backfaces: bool,
+    /// What a contribution of indirect light is at most, cd/m^2 of its largest channel (`clamp.rs`); biased.
+    pub clamp: Option<f32>,
     /// Random numbers' seed.
     pub seed: u64,
     /// Frame number, part of the random numbers.

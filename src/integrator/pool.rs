@@ -61,6 +61,8 @@ pub struct PathPool {
 
     /// Radiance gathered so far, by slot.
     pub radiance: Vec<[f32; 3]>,
+    /// What `--clamp` took of it, all channels together, by slot.
+    pub taken: Vec<f64>,
     /// Pixel in the tile and sample index, by slot.
     pub origin: Vec<(u32, u32)>,
     /// Slots of no path.
@@ -78,6 +80,8 @@ pub struct PathPool {
     pub shadow_slot: Buffer<u32>,
     /// What arrives if nothing is in between.
     pub shadow_radiance: [Buffer<f32>; 3],
+    /// What `--clamp` took for each part of that; empty without it.
+    pub shadow_excess: Buffer<f32>,
     /// 1 where something is in between.
     pub occluded: Vec<u8>,
 }
@@ -109,6 +113,7 @@ impl PathPool {
             light_scratch: Buffer::new(0),
             slot: ints(),
             radiance: vec![[0.0; 3]; POOL],
+            taken: Vec::new(),
             origin: vec![(0, 0); POOL],
             free: (0..POOL as u32).rev().collect(),
             dead: ints(),
@@ -117,12 +122,16 @@ impl PathPool {
             n_shadow: 0,
             shadow_slot: ints(),
             shadow_radiance: [floats(), floats(), floats()],
+            shadow_excess: Buffer::new(0),
             occluded: vec![0; room],
         }
     }
 
-    /// Makes room for what paths in the scene of `tables` remember beyond other paths.
-    pub fn fit(&mut self, tables: &SceneTables) {
+    /// Makes room for what paths in the scene of `tables` remember beyond other paths, and for what a clamp does.
+    pub fn fit(&mut self, tables: &SceneTables, is_clamped: bool) {
+        if is_clamped && self.taken.is_empty() {
+            (self.taken, self.shadow_excess) = (vec![0.0; POOL], Buffer::new(ROOM));
+        }
         let media = &tables.media;
         if media.has_volume() && self.media[0].is_empty() {
             self.media = std::array::from_fn(|_| Buffer::new(ROOM));
@@ -191,6 +200,12 @@ impl PathPool {
         radiance.y.compress(keep, &mut self.shadow_radiance[1], to);
         radiance.z.compress(keep, &mut self.shadow_radiance[2], to);
         self.n_shadow += keep.count();
+    }
+
+    /// Notes that `--clamp` took `excess` for each part of `left`, which was added to a slot.
+    #[inline(always)]
+    pub fn take(&mut self, slot: u32, left: [f32; 3], excess: f32) {
+        self.taken[slot as usize] += left.iter().map(|&channel| f64::from(channel)).sum::<f64>() * f64::from(excess);
     }
 
     /// Adds to the radiance of a slot.

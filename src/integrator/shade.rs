@@ -1,6 +1,7 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
 use super::PathTracer;
+use super::clamp::{Limit, add_limited};
 use super::closure::{closure, surface};
 use super::cone::Cone;
 use super::emission::emitted;
@@ -61,13 +62,13 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let primitive = L::U::load(&pool.hits.primitive, at);
     let mut hit = active & !primitive.eq(L::U::splat(MISS));
     if tables.lights.has_environment() {
-        see_environment::<L>(tables, pool, at, slot, active & !hit);
+        see_environment::<L>(tracer, pool, at, slot, active & !hit);
     }
     if !tables.lights.balls().is_empty() {
-        see_balls::<L>(tables, pool, at, slot, active, hit);
+        see_balls::<L>(tracer, pool, at, slot, active, hit);
     }
     if !tables.lights.suns().is_empty() {
-        see_suns::<L>(tables, pool, at, slot, active & !hit);
+        see_suns::<L>(tracer, pool, at, slot, active & !hit);
     }
     if tables.media.has_volume() {
         let inside = !Stack::<L>::load(&pool.media, at).innermost().eq(L::U::splat(AIR));
@@ -79,6 +80,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         return;
     }
     let depth = L::U::load(&pool.depth, at);
+    let limit = Limit::<L>::new(tracer.clamp, depth);
     let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
     let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
     let mut si = interact::<L>(tables, &pool.hits, at, wo, primitive, hit);
@@ -120,7 +122,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
             // Only to rays that show things as they are: from the camera or a mirror.
             let seen = unlit & !L::F::load(&pool.prev_pdf, at).is_finite();
             let color = surface(tables, &si, seen).base;
-            add_lanes::<L>(pool, slot, beta * color, seen);
+            add_limited::<L>(limit, pool, slot, beta * color, seen);
             hit = hit & !unlit;
         }
     }
@@ -129,7 +131,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         let prev_pdf = L::F::load(&pool.prev_pdf, at);
         let (radiance, lit) = emitted(tables, &si, &pool.from, at, distance, prev_pdf, hit);
         if lit.any() {
-            add_lanes::<L>(pool, slot, beta * radiance, lit);
+            add_limited::<L>(limit, pool, slot, beta * radiance, lit);
         }
     }
 
@@ -151,7 +153,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         let u = key.group(vertex + vertex + L::U::splat(dims::FIRST_LIGHT));
         let (to, to_bulbs) = (pool.n_shadow, pool.bulbs.as_ref().map_or(0, |bulbs| bulbs.n));
         let (closure, crossing) = (&closure, crossing.as_ref());
-        let here = Vertex { si: &si, closure, crossing, receiver: &receiver, start, beta, slot };
+        let scatterings = depth + L::U::splat(1);
+        let limit = Limit::<L>::new(tracer.clamp, scatterings);
+        let here = Vertex { si: &si, closure, crossing, receiver: &receiver, start, beta, scatterings, limit, slot };
         let queued = queue_light_sample::<L>(tables, pool, &here, u, scatters);
         expected = queued.total;
         if tables.materials.has_alpha() {

@@ -3,30 +3,38 @@
 //! Rays from the camera do not see them: a lamp of `--light-radius` in the picture is seldom what is meant. One that comes
 //! from a mirror or through glass has been scattered.
 
-use super::SceneTables;
+use super::PathTracer;
+use super::clamp::{Limit, add_limited};
 use super::medium::Stack;
 use super::pool::PathPool;
 use super::receiver;
-use super::shade::{add_lanes, load3};
+use super::shade::load3;
 use super::weight::weight_of_remembered;
 use crate::math::V3;
 use simd::{Float, Lanes, Mask, Part, Uint};
 
 /// Adds what balls send along the rays `at ..` of `active`, which end at what they hit in the lanes of `hit`.
 #[inline(always)]
-pub fn see_balls<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, slot: L::U, active: L::M, hit: L::M) {
+pub fn see_balls<L: Lanes>(
+    tracer: &PathTracer<'_>,
+    pool: &mut PathPool,
+    at: usize,
+    slot: L::U,
+    active: L::M,
+    hit: L::M,
+) {
     let scattered = active & scattered::<L>(pool, at);
     if scattered.any() {
-        L::outline(SeeBalls { tables, pool, at, slot, scattered, hit });
+        L::outline(SeeBalls { tracer, pool, at, slot, scattered, hit });
     }
 }
 
 /// Adds what suns send along the rays `at ..` that are `missed`.
 #[inline(always)]
-pub fn see_suns<L: Lanes>(tables: &SceneTables, pool: &mut PathPool, at: usize, slot: L::U, missed: L::M) {
+pub fn see_suns<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize, slot: L::U, missed: L::M) {
     let scattered = missed & scattered::<L>(pool, at);
     if scattered.any() {
-        L::outline(SeeSuns { tables, pool, at, slot, scattered });
+        L::outline(SeeSuns { tracer, pool, at, slot, scattered });
     }
 }
 
@@ -37,8 +45,8 @@ fn scattered<L: Lanes>(pool: &PathPool, at: usize) -> L::M {
 }
 
 /// [`see_balls`].
-struct SeeBalls<'a, L: Lanes> {
-    tables: &'a SceneTables,
+struct SeeBalls<'a, 't, L: Lanes> {
+    tracer: &'a PathTracer<'t>,
     pool: &'a mut PathPool,
     at: usize,
     slot: L::U,
@@ -46,12 +54,14 @@ struct SeeBalls<'a, L: Lanes> {
     hit: L::M,
 }
 
-impl<L: Lanes> Part<L> for SeeBalls<'_, L> {
+impl<L: Lanes> Part<L> for SeeBalls<'_, '_, L> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { tables, pool, at, slot, scattered, hit } = self;
+        let Self { tracer, pool, at, slot, scattered, hit } = self;
+        let tables = tracer.tables;
+        let limit = Limit::<L>::new(tracer.clamp, L::U::load(&pool.depth, at));
         let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
         let mut origin = load3::<L>(&pool.rays.ox, &pool.rays.oy, &pool.rays.oz, at);
         let mut end = L::F::load(&pool.hits.t, at).or_else(hit, L::F::splat(f32::INFINITY));
@@ -76,26 +86,28 @@ impl<L: Lanes> Part<L> for SeeBalls<'_, L> {
                 let medium = Stack::<L>::load(&pool.media, at).innermost();
                 radiance = radiance * tables.media.transmittance(medium, met.distance - start);
             }
-            add_lanes::<L>(pool, slot, radiance, sees);
+            add_limited::<L>(limit, pool, slot, radiance, sees);
         }
     }
 }
 
 /// [`see_suns`].
-struct SeeSuns<'a, L: Lanes> {
-    tables: &'a SceneTables,
+struct SeeSuns<'a, 't, L: Lanes> {
+    tracer: &'a PathTracer<'t>,
     pool: &'a mut PathPool,
     at: usize,
     slot: L::U,
     scattered: L::M,
 }
 
-impl<L: Lanes> Part<L> for SeeSuns<'_, L> {
+impl<L: Lanes> Part<L> for SeeSuns<'_, '_, L> {
     type Output = ();
 
     #[inline(always)]
     fn run(self) {
-        let Self { tables, pool, at, slot, scattered } = self;
+        let Self { tracer, pool, at, slot, scattered } = self;
+        let tables = tracer.tables;
+        let limit = Limit::<L>::new(tracer.clamp, L::U::load(&pool.depth, at));
         let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
         let from = receiver::load::<L>(tables, &pool.from, at);
         let prev_pdf = L::F::load(&pool.prev_pdf, at);
@@ -111,7 +123,7 @@ impl<L: Lanes> Part<L> for SeeSuns<'_, L> {
                 beta = beta * tables.media.transmittance_from_far(medium);
             }
             let radiance: V3<L> = met.radiance.scale(weight_of_remembered::<L>(prev_pdf, met.pdf));
-            add_lanes::<L>(pool, slot, beta * radiance, sees);
+            add_limited::<L>(limit, pool, slot, beta * radiance, sees);
         }
     }
 }

@@ -4,11 +4,11 @@
 //! meets something else. Paths do the same on average (`BsdfSample::straight`), so both strategies of finding a light see
 //! the same one, and their densities are those of the last real scattering.
 
+use super::PathTracer;
 use super::closure::pane;
 use super::pool::{PathPool, ROOM};
 use super::shade::{add_lanes, load3};
 use super::wave::Counters;
-use super::{PathTracer, SceneTables};
 use crate::accel::{HitBatch, MISS};
 use crate::math::V3;
 use simd::{Buffer, Float, Lanes, Mask, Scalar, Uint};
@@ -45,22 +45,23 @@ impl PathTracer<'_> {
             let Some(glass) = &mut pool.glass else { return };
             counters.shadow += pool.n_shadow as u64;
             self.accel.intersect(&pool.shadow, 0..pool.n_shadow, false, &mut glass.hits);
-            pass(self.tables, pool);
+            pass(self, pool);
         }
     }
 }
 
 /// One round: rays that got through are added, those at glass are packed to the front, the others are blocked. One ray at a
 /// time: few surfaces are smooth thin glass.
-fn pass(tables: &SceneTables, pool: &mut PathPool) {
+fn pass(tracer: &PathTracer<'_>, pool: &mut PathPool) {
     let n = std::mem::take(&mut pool.n_shadow);
     for at in 0..n {
-        pass_one(tables, pool, at);
+        pass_one(tracer, pool, at);
     }
 }
 
 /// Ray `at`.
-fn pass_one(tables: &SceneTables, pool: &mut PathPool, at: usize) {
+fn pass_one(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize) {
+    let tables = tracer.tables;
     let active = <Scalar as Lanes>::M::first(1);
     let Some(glass) = &pool.glass else { return };
     let slot = <Scalar as Lanes>::U::load(&pool.shadow_slot, at);
@@ -68,6 +69,10 @@ fn pass_one(tables: &SceneTables, pool: &mut PathPool, at: usize) {
     let radiance = load3::<Scalar>(r, g, b, at);
     if glass.hits.primitive[at] == MISS {
         add_lanes::<Scalar>(pool, slot, radiance, active);
+        if tracer.clamp.is_some() {
+            let left = [radiance.x.first(), radiance.y.first(), radiance.z.first()];
+            pool.take(pool.shadow_slot[at], left, pool.shadow_excess[at]);
+        }
         return;
     }
     let direction = load3::<Scalar>(&pool.shadow.dx, &pool.shadow.dy, &pool.shadow.dz, at);
@@ -79,6 +84,9 @@ fn pass_one(tables: &SceneTables, pool: &mut PathPool, at: usize) {
     let direction = direction.or_else(!t_max.is_finite(), end - origin);
     let passes = active & radiance.max_component().gt(<Scalar as Lanes>::F::zero());
     let to = pool.n_shadow;
+    if tracer.clamp.is_some() && passes.any() {
+        pool.shadow_excess[to] = pool.shadow_excess[at];
+    }
     if tables.materials.has_alpha() {
         key.compress(passes, &mut pool.shadow.key, to);
     }

@@ -7,6 +7,7 @@ use crate::math::V3;
 use crate::sampler::{Key, coverage_key, dims, pixel_seed};
 use simd::{Float, Kernel, Lanes, Uint, dispatch_large};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Receives finished samples, in a fixed order for a fixed unit.
 pub trait SampleSink {
@@ -31,6 +32,8 @@ pub struct Unit {
     pub height: u32,
     /// Sample indices.
     pub samples: Range<u32>,
+    /// The pixels that are traced, row by row; `None`: all.
+    pub only: Option<Arc<[bool]>>,
 }
 
 /// Rays and events of one worker.
@@ -47,6 +50,8 @@ pub struct Counters {
     /// Crossings of volumes' boundaries that do not pair up: leaving what was not entered, being inside of something far
     /// from everything, being inside of more than a path remembers.
     pub unpaired: u64,
+    /// What `--clamp` took, all channels and paths together: cd/m^2.
+    pub taken: f64,
 }
 
 impl Counters {
@@ -57,12 +62,13 @@ impl Counters {
 
     /// Adds those of another worker.
     pub fn add(&mut self, other: &Self) {
-        let Self { camera, bounce, shadow, truncated, unpaired } = other;
+        let Self { camera, bounce, shadow, truncated, unpaired, taken } = other;
         self.camera += camera;
         self.bounce += bounce;
         self.shadow += shadow;
         self.truncated += truncated;
         self.unpaired += unpaired;
+        self.taken += taken;
     }
 }
 
@@ -84,7 +90,7 @@ impl PathTracer<'_> {
     /// it did before.
     pub fn trace(&self, unit: &Unit, worker: &mut Worker, sink: &mut impl SampleSink) {
         let Worker { pool, counters } = worker;
-        pool.fit(self.tables);
+        pool.fit(self.tables, self.clamp.is_some());
         let mut feed = Feed::new(unit);
         loop {
             let old = pool.n;
@@ -106,7 +112,9 @@ impl PathTracer<'_> {
                 let slot = pool.dead[i];
                 let radiance = std::mem::take(&mut pool.radiance[slot as usize]);
                 let (pixel, sample) = pool.origin[slot as usize];
+                let taken = pool.taken.get_mut(slot as usize).map_or(0.0, std::mem::take);
                 if radiance.iter().all(|r| r.is_finite()) {
+                    counters.taken += taken;
                     sink.add(pixel, sample, radiance);
                 } else {
                     sink.drop_non_finite(pixel, sample);
@@ -134,7 +142,11 @@ impl PathTracer<'_> {
         for i in 0..n_shadow {
             if pool.occluded[i] == 0 {
                 let [r, g, b] = &pool.shadow_radiance;
-                pool.add(pool.shadow_slot[i], [r[i], g[i], b[i]]);
+                let (slot, radiance) = (pool.shadow_slot[i], [r[i], g[i], b[i]]);
+                pool.add(slot, radiance);
+                if self.clamp.is_some() {
+                    pool.take(slot, radiance, pool.shadow_excess[i]);
+                }
             }
         }
     }
@@ -158,6 +170,10 @@ impl Feed {
         let mut n = start;
         // The film position's pixel goes into the ray's origin until the kernel below replaces it.
         while n < POOL && self.pixel < self.pixels {
+            if unit.only.as_ref().is_some_and(|only| !only[self.pixel as usize]) {
+                self.pixel += 1;
+                continue;
+            }
             let (x, y) = (unit.x + self.pixel % unit.width, unit.y + self.pixel / unit.width);
             let seed = pixel_seed(tracer.seed, tracer.frame, x, y);
             while n < POOL && self.sample < unit.samples.end {

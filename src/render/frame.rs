@@ -5,10 +5,11 @@ use super::prepare::prepare;
 use super::schedule::Totals;
 use super::stopping::{Next, StoppedBy, Waves};
 use super::{
-    Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, TargetReport, schedule, tracer,
+    Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, SpreadReport, TargetReport, schedule,
+    tracer,
 };
 use crate::error::RenderError;
-use crate::film::{Errors, Film, TILE, Tile};
+use crate::film::{Errors, Film, Spread, TILE, Tile};
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
 use std::sync::atomic::Ordering;
@@ -90,11 +91,14 @@ pub fn render_prepared(
     let window_tile = Tile { x: window.x, y: window.y, width: window.width, height: window.height };
     progress.enter(Phase::Rendering);
     let start = Instant::now();
-    let Sampled { film, totals, pixels, errors, stopped_by } = sample(&tracer, window_tile, settings, progress)?;
+    let Sampled { film, totals, pixels, errors, stopped_by, spread } =
+        sample(&tracer, window_tile, settings, progress)?;
     let render_seconds = start.elapsed().as_secs_f64();
     let spp = film.spp();
     let paths = window_tile.area() as u64 * u64::from(spp);
 
+    let shown = pixels.iter().flatten().map(|&channel| f64::from(channel)).sum::<f64>() * f64::from(spp);
+    let taken = totals.counters.taken;
     let features = features(scene, &prepared);
     let lanes = tracer.level.lanes();
     let mut warnings = prepared.warnings;
@@ -131,9 +135,14 @@ pub fn render_prepared(
         non_finite_samples: totals.non_finite,
         non_finite_examples: totals.examples,
         truncated: totals.counters.truncated as f64 / paths as f64,
+        energy_clamped: if taken > 0.0 { taken / (taken + shown) } else { 0.0 },
         error: errors.as_ref().map(|errors| errors.estimate),
         worst: errors.as_ref().map(Errors::worst),
         stopped_by,
+        spread: spread.map(|spread| {
+            let [least, most] = film.extremes();
+            SpreadReport { stage: spread.stage(), round: spread.round(), least, most, gain: spread.gain() }
+        }),
         target,
         triangles: prepared.placed.triangles,
         instances: scene.instances.len() as u64,
@@ -164,6 +173,8 @@ struct Sampled {
     pixels: Vec<[f32; 3]>,
     errors: Option<Errors>,
     stopped_by: StoppedBy,
+    /// How samples were spread, if unevenly.
+    spread: Option<Spread>,
 }
 
 /// Units of work a thread below which tiles are made smaller.
@@ -185,25 +196,30 @@ fn sample(
     let mut waves = Waves::new(stopping, settings.spp, start);
     let mut totals = Totals::default();
     let mut pixels = Vec::new();
+    let mut spread: Option<Spread> = None;
     let stopped_by = loop {
-        let to = match waves.next(elapsed()) {
-            Next::To(to) => to,
-            Next::Stop(by) => break by,
+        let (to, wave) = match (waves.next(elapsed()), &mut spread) {
+            (Next::Stop(by), _) => break by,
+            (Next::To(to), _) => (to, Some(film.wave(to))),
+            (Next::Spread, spread) => (0, spread.as_mut().and_then(|spread| spread.next_wave(&film, settings.spp))),
         };
+        let Some(wave) = wave else { break StoppedBy::Spp };
         let paths = |spp: u32| window.area() as u64 * u64::from(spp);
         let expected = waves.expected(elapsed()).map_or(0, |spp| paths(spp.max(to)));
         progress.total.store(expected, Ordering::Relaxed);
         let before = elapsed();
-        let wave = film.wave(to);
         totals.add(schedule::trace(tracer, &wave, progress));
         if progress.is_cancelled() {
             return Err(RenderError::Interrupted);
         }
         film.take(wave);
-        waves.took(to, elapsed() - before);
+        waves.took(film.spp(), elapsed() - before);
         if waves.looks() {
             pixels = film.mean();
             waves.saw(film.errors(&pixels));
+        }
+        if settings.adaptive && waves.may_spread() {
+            spread = film.spread(&pixels).filter(|spread| waves.spreads(spread.gain()));
         }
     };
     let is_seen = waves.looks();
@@ -212,5 +228,5 @@ fn sample(
     }
     let errors = if is_seen { waves.into_errors() } else { film.errors(&pixels) };
     progress.total.store(window.area() as u64 * u64::from(film.spp()), Ordering::Relaxed);
-    Ok(Sampled { film, totals, pixels, errors, stopped_by })
+    Ok(Sampled { film, totals, pixels, errors, stopped_by, spread })
 }

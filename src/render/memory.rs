@@ -107,7 +107,10 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let is_open = settings.stopping.is_open();
     let held = if is_open { blocks::MOST.min(settings.spp) } else { blocks::layout(settings.spp).len() as u32 };
     let layers = settings.layers.bytes();
-    let film = pixels.saturating_mul(16 * u64::from(held) + 12 + layers);
+    // How samples are spread: noise and cost of each pixel while it is decided.
+    let may_spread = settings.adaptive && settings.stopping.target_error.is_some();
+    let spread = if may_spread { 24 } else { 0 };
+    let film = pixels.saturating_mul(16 * u64::from(held) + 12 + spread + layers);
     let film = film.saturating_add(film / 100);
     let embree =
         if settings.accel == AccelChoice::Auto || settings.accel == AccelChoice::Embree { EMBREE_LIBRARY } else { 0 };

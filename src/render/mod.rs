@@ -79,6 +79,8 @@ pub struct RenderStats {
     pub non_finite_examples: Vec<(u32, u32, u32)>,
     /// Share of paths ended by the bounce limit that is a safety cap (not by `--max-bounces`).
     pub truncated: f64,
+    /// Share of the picture's light that the clamp took, all channels together; 0 without one.
+    pub energy_clamped: f64,
     /// How far the picture is from that of endless samples; `None` with fewer than four samples a pixel, or if it is
     /// black.
     pub error: Option<crate::film::ErrorEstimate>,
@@ -86,6 +88,8 @@ pub struct RenderStats {
     pub worst: Option<crate::film::Square>,
     /// What ended sampling.
     pub stopped_by: StoppedBy,
+    /// How samples were spread over the pixels; `None`: each has as many.
+    pub spread: Option<SpreadReport>,
     /// What came of the target of the error, where there was one.
     pub target: Option<TargetReport>,
     /// Triangles that rays can meet, with every instance.
@@ -112,6 +116,21 @@ pub struct RenderStats {
     pub losses: Vec<String>,
 }
 
+/// Samples that are not as many in every pixel: decided after `stage` of each, by the noise of the pixels around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpreadReport {
+    /// Samples of each pixel before.
+    pub stage: u32,
+    /// Waves since; with the stage it says how many samples each pixel has.
+    pub round: u32,
+    /// Samples of the pixels with fewest.
+    pub least: u32,
+    /// Samples of the pixels with most.
+    pub most: u32,
+    /// The share of the work that it was thought to take.
+    pub gain: f64,
+}
+
 /// How near a picture came to the error that was asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TargetReport {
@@ -136,7 +155,7 @@ pub struct Frame {
     pub window: CropWindow,
     /// `[window.height * window.width]` linear Rec.709 radiance, nits; alpha is 1.
     pub pixels: Vec<[f32; 3]>,
-    /// Samples per pixel that were taken.
+    /// Samples per pixel that were taken; the mean, rounded, where they are spread unevenly.
     pub spp: u32,
     /// `[window.height * window.width]` variance of each channel of the pixel, if that was asked for: on the safe side,
     /// infinite with one sample.

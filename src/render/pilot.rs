@@ -93,7 +93,7 @@ fn patch(i: u32, window: CropWindow, side: u32, samples: u32) -> Unit {
     let (width, height) = (side.min(window.width), side.min(window.height));
     let place = |step: f64, room: u32| ((0.5 + step * f64::from(i)).fract() * f64::from(room + 1)) as u32;
     let (x, y) = (place(STEP[0], window.width - width), place(STEP[1], window.height - height));
-    Unit { x: window.x + x, y: window.y + y, width, height, samples: 0..samples }
+    Unit { x: window.x + x, y: window.y + y, width, height, samples: 0..samples, only: None }
 }
 
 #[cfg(test)]

@@ -20,6 +20,15 @@ pub struct Totals {
     pub examples: Vec<(u32, u32, u32)>,
 }
 
+/// What a worker found.
+#[derive(Default)]
+struct Found {
+    /// What the clamp took, by unit, so that no sum depends on who traced what.
+    taken: Vec<(usize, f64)>,
+    /// Dropped samples, by unit.
+    examples: Vec<(usize, (u32, u32, u32))>,
+}
+
 impl Totals {
     /// Adds those of a later wave.
     pub fn add(&mut self, later: Self) {
@@ -73,11 +82,11 @@ impl SampleSink for Sink<'_> {
 /// `progress` is cancelled: a round of a worker's paths takes about a millisecond.
 pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Totals {
     let next = AtomicUsize::new(0);
-    let found = Mutex::new((Totals::default(), Vec::new()));
+    let found = Mutex::new((Totals::default(), Found::default()));
     rayon::broadcast(|_| {
         let mut worker = Worker::default();
         let mut non_finite = 0;
-        let mut examples = Vec::new();
+        let mut own = Found::default();
         while !progress.is_cancelled() {
             let i = next.fetch_add(1, Ordering::Relaxed);
             if i >= wave.units() {
@@ -85,7 +94,9 @@ pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Total
             }
             let (tile, samples) = wave.unit(i);
             let sums = TileSums::new(&tile, &samples);
-            let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples };
+            let only = wave.only(i);
+            let unit = Unit { x: tile.x, y: tile.y, width: tile.width, height: tile.height, samples, only };
+            let before = worker.counters.total();
             let mut sink = Sink {
                 unit: &unit,
                 progress,
@@ -99,18 +110,24 @@ pub fn trace(tracer: &PathTracer<'_>, wave: &Wave, progress: &Progress) -> Total
             if progress.is_cancelled() {
                 break;
             }
+            sink.sums.add_rays(worker.counters.total() - before);
             wave.store(i, &sink.sums);
             non_finite += sink.non_finite;
-            examples.extend(sink.examples.into_iter().map(|e| (i, e)));
+            own.examples.extend(sink.examples.into_iter().map(|e| (i, e)));
+            own.taken.push((i, std::mem::take(&mut worker.counters.taken)));
         }
         let mut found = found.lock().expect("no worker panics with the lock held");
         let (totals, all) = &mut *found;
         totals.counters.add(&worker.counters);
         totals.non_finite += non_finite;
-        all.extend(examples);
+        all.examples.extend(own.examples);
+        all.taken.extend(own.taken);
     });
-    let (mut totals, mut examples) = found.into_inner().expect("no worker panics with the lock held");
+    let (mut totals, Found { mut taken, mut examples }) =
+        found.into_inner().expect("no worker panics with the lock held");
     examples.sort_unstable();
+    taken.sort_unstable_by_key(|(i, _)| *i);
+    totals.counters.taken = taken.into_iter().map(|(_, taken)| taken).sum();
     totals.examples = examples.into_iter().take(EXAMPLES).map(|(_, e)| e).collect();
     totals
 }

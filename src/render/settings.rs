@@ -88,6 +88,8 @@ pub struct RenderSettings {
     pub spp: u32,
     /// What may end sampling before that.
     pub stopping: Stopping,
+    /// With a target of the error and no limit of time, pixels may get different numbers of samples.
+    pub adaptive: bool,
     /// Same seed, same pixels.
     pub seed: u64,
     /// Animation frame number; part of the random numbers.
@@ -98,6 +100,8 @@ pub struct RenderSettings {
     pub cull_backfaces: bool,
     /// Textures are averaged over cones around the paths; biased.
     pub texture_lod: bool,
+    /// What a contribution of light is at most after two scatterings or more, cd/m^2 of its largest channel, above 0; biased.
+    pub clamp: Option<f32>,
     /// Pixel filter.
     pub filter: Filter,
     /// Microfacet model.
@@ -133,11 +137,13 @@ impl Default for RenderSettings {
             crop: None,
             spp: 64,
             stopping: Stopping::default(),
+            adaptive: true,
             seed: 0,
             frame: 0,
             max_bounces: None,
             cull_backfaces: false,
             texture_lod: false,
+            clamp: None,
             filter: Filter::default(),
             brdf: Brdf::default(),
             default_light: DefaultLight::default(),

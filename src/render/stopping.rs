@@ -42,6 +42,10 @@ pub enum StoppedBy {
 const LEAST: u32 = 64;
 /// At so many samples a picture is looked at for the first time.
 const FIRST_LOOK: u32 = 32;
+/// Samples are spread over the pixels by what a stage of at least this share of all of them tells.
+const STAGE: f64 = 1.0 / 16.0;
+/// They are not where less work than this share is in sight: what is told by few samples flatters.
+const WORTH: f64 = 0.7;
 /// What of the time left the last wave is made to take.
 const FILL: f64 = 0.98;
 
@@ -60,6 +64,7 @@ pub(super) struct Waves {
     before: Option<Errors>,
     /// Looks at which nothing was seen but black.
     black: u32,
+    is_spread: bool,
 }
 
 /// What follows.
@@ -67,6 +72,8 @@ pub(super) struct Waves {
 pub(super) enum Next {
     /// On to so many samples a pixel.
     To(u32),
+    /// On by the next wave of samples that are spread unevenly.
+    Spread,
     /// The picture is done.
     Stop(StoppedBy),
 }
@@ -78,7 +85,17 @@ impl Waves {
         let share = stopping.batch_until.map(|until| until.saturating_duration_since(start).as_secs_f64());
         let share = share.map(|seconds| (seconds, StoppedBy::BatchTimeLimit));
         let limit = [own, share].into_iter().flatten().reduce(|a, b| if b.0 < a.0 { b } else { a });
-        Self { most, target: stopping.target_error, limit, done: 0, pace: 0.0, now: None, before: None, black: 0 }
+        Self {
+            most,
+            target: stopping.target_error,
+            limit,
+            done: 0,
+            pace: 0.0,
+            now: None,
+            before: None,
+            black: 0,
+            is_spread: false,
+        }
     }
 
     /// What follows when `elapsed` seconds have passed since the first sample.
@@ -88,6 +105,9 @@ impl Waves {
         }
         if self.done >= self.most {
             return Next::Stop(StoppedBy::Spp);
+        }
+        if self.is_spread {
+            return Next::Spread;
         }
         let to = self.rung().min(self.most);
         // The least picture has one sample a pixel, however little time there is.
@@ -117,10 +137,28 @@ impl Waves {
         }
     }
 
-    /// A wave that ended at `spp` samples took `seconds`.
+    /// A wave that ended at `spp` samples (the mean where they are spread) took `seconds`.
     pub fn took(&mut self, spp: u32, seconds: f64) {
-        self.pace = seconds / f64::from(spp - self.done);
+        self.pace = seconds / f64::from(spp.saturating_sub(self.done).max(1));
         self.done = spp;
+    }
+
+    /// Whether it is time to think about spreading samples unevenly: a target is far enough away to gain by it, and near
+    /// enough that what is known now is a good share of what there will be. A limit of time would make of it a picture
+    /// that cannot be had again.
+    pub fn may_spread(&self) -> bool {
+        let (Some(target), None, false) = (self.target, self.limit, self.is_spread) else { return false };
+        let Some(now) = self.now.as_ref().filter(|_| self.done >= LEAST && self.done.is_power_of_two()) else {
+            return false;
+        };
+        let (done, needed) = (f64::from(self.done), now.spp_for(target).min(f64::from(self.most)));
+        done >= STAGE * needed && 1.5 * done < needed && !self.is_good_enough()
+    }
+
+    /// Samples are spread from now on if it takes this share of the work to do so; whether they are.
+    pub fn spreads(&mut self, gain: f64) -> bool {
+        self.is_spread = gain < WORTH;
+        self.is_spread
     }
 
     /// Whether it is to be known now what the film says of its error.

@@ -30,6 +30,7 @@ fn run(mut waves: Waves, pace: f64, look: impl Fn(u32) -> Option<Errors>) -> (Ve
         let before = ends[ends.len() - 1];
         match waves.next(seconds) {
             Next::Stop(by) => return (ends, by),
+            Next::Spread => unreachable!("only where that was decided"),
             Next::To(to) => {
                 seconds += pace * f64::from(to - before);
                 waves.took(to, pace * f64::from(to - before));
@@ -130,4 +131,26 @@ fn how_many_samples_there_will_be_is_foretold() {
     let mut by_time = waves(1 << 20, None, Some(10.0));
     by_time.took(4, 0.4);
     assert_eq!(by_time.expected(0.4), Some(4 + 94));
+}
+
+#[test]
+fn samples_are_spread_where_a_target_is_neither_near_nor_out_of_sight_and_work_is_saved() {
+    let stated = errors(64, 1.0, 32);
+    let at = |target: f64, seconds: Option<f64>, done: u32| {
+        let mut waves = waves(1 << 14, Some(target), seconds);
+        waves.took(done, 1.0);
+        waves.saw(Some(errors(done, 1.0, 32)));
+        waves
+    };
+    let upper = |spp: u32| stated.upper_at(spp);
+    assert!(at(upper(256), None, 64).may_spread());
+    assert!(!at(upper(80), None, 64).may_spread(), "near");
+    assert!(!at(upper(1 << 12), None, 64).may_spread(), "out of sight");
+    assert!(at(upper(1 << 12), None, 512).may_spread());
+    assert!(!at(upper(256), None, 32).may_spread(), "too early");
+    assert!(!at(upper(256), None, 96).may_spread(), "not a power of two");
+    assert!(!at(upper(256), Some(1e9), 64).may_spread(), "what time ends must be had by --spp");
+    let mut waves = at(upper(256), None, 64);
+    assert!(!waves.spreads(0.8) && waves.next(0.0) == Next::To(96));
+    assert!(waves.spreads(0.6) && waves.next(0.0) == Next::Spread && !waves.may_spread());
 }

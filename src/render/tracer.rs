@@ -47,6 +47,7 @@ pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSett
         max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
         is_capped: settings.max_bounces.is_none(),
         cull_backfaces: settings.cull_backfaces,
+        clamp: settings.clamp,
         seed: settings.seed,
         frame: settings.frame,
         level,

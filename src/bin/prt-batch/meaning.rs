@@ -134,6 +134,8 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         brdf: args.brdf,
         cull_backfaces: args.cull_backfaces,
         texture_lod: args.texture_lod,
+        clamp: args.clamp,
+        adaptive: args.adaptive == parse::Adaptive::Auto,
         default_light: args.default_light,
         light_radius: args.light_radius,
         sun_angle: args.sun_angle,

@@ -95,6 +95,14 @@ pub fn sun_angle(value: &str) -> Result<f64, String> {
     value.parse().ok().filter(inside).ok_or_else(|| "must be degrees from 1e-4 to 180, or 0 for no size".into())
 }
 
+/// Nits.
+pub fn clamp(value: &str) -> Result<f32, String> {
+    let inside = |most: &f32| (1e-6..=1e12).contains(most);
+    value.parse().ok().filter(inside).ok_or_else(|| {
+        "must be nits from 1e-6 to 1e12, such as 10; without indirect light at all: --max-bounces 0".into()
+    })
+}
+
 pub fn spp(value: &str) -> Result<u32, String> {
     number(value, 1, MAX_SPP)
 }
@@ -221,6 +229,17 @@ pub fn accel() -> Words<AccelChoice> {
 pub fn default_light() -> Words<DefaultLight> {
     use DefaultLight::{Auto, Off, On};
     Words::new(&[("auto", Auto), ("on", On), ("off", Off)], &[])
+}
+
+/// When samples may be spread unevenly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Adaptive {
+    Auto,
+    Off,
+}
+
+pub fn adaptive() -> Words<Adaptive> {
+    Words::new(&[("auto", Adaptive::Auto), ("off", Adaptive::Off)], &[])
 }
 
 pub fn brdf() -> Words<Brdf> {

@@ -20,12 +20,6 @@ const fn option(heading: &'static str, name: &'static str, value: &'static str, 
 
 const OPTIONS: &[Unbuilt] = &[
     option(
-        "Sampling",
-        "clamp",
-        "C",
-        "Indirect radiance clamp; biased, so off, and the energy it removes is reported [default: off]",
-    ),
-    option(
         "Lens",
         "f-stop",
         "N",

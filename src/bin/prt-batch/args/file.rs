@@ -113,6 +113,13 @@ pub struct FileArgs {
     #[arg(long, value_name = "TIME", value_parser = parse::duration, allow_hyphen_values = true)]
     #[arg(help_heading = SAMPLING)]
     pub time_limit: Option<Duration>,
+    /// Whether pixels may get different numbers of samples, with --target-error
+    ///
+    /// auto: where that is likely to save 30 % of the work, and without a limit of time; see "When sampling ends" below.
+    /// off: every pixel has as many.
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = parse::adaptive())]
+    #[arg(help_heading = SAMPLING)]
+    pub adaptive: parse::Adaptive,
     /// Same seed, same pixels
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
     pub seed: u64,
@@ -150,6 +157,13 @@ pub struct FileArgs {
     /// textures at any number. Emission and opacity are not.
     #[arg(long, help_heading = SAMPLING)]
     pub texture_lod: bool,
+    /// Most nits that indirect light brings at once (biased); what it takes is reported [default: off]
+    ///
+    /// From 1e-6 to 1e12. Each contribution of light after two scatterings or more is scaled down until its largest
+    /// channel is at most C; what the camera sees by itself and direct light on it are left alone. Ends fireflies, and
+    /// darkens the picture: the share of its light that was taken is energy_clamped of the JSON.
+    #[arg(long, value_name = "C", value_parser = parse::clamp, allow_hyphen_values = true, help_heading = SAMPLING)]
+    pub clamp: Option<f32>,
 
     /// Built-in studio light
     ///

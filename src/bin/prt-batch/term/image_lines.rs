@@ -2,7 +2,7 @@
 
 use super::style::Paint;
 use super::text::{count, indented, mrays_per_s, printable, seconds};
-use prt::batch::report::{Accel, ImageReport, Status, percent};
+use prt::batch::report::{Accel, Adaptive, ImageReport, Status, percent};
 
 /// A name that no other image of the run has: its first output, else its input.
 pub fn name(image: &ImageReport) -> String {
@@ -80,6 +80,10 @@ pub fn details(image: &ImageReport) -> Vec<String> {
         let above =
             above.map_or(String::new(), |share| format!("; {:.0} % of the pixels above the target", 100.0 * share));
         lines.push(format!("  error {} ({low} to {high}){by}{worst}{above}", error.percent()));
+    }
+    if let Some(Adaptive { stage, least, most, gain }) = &image.adaptive {
+        let saved = 100.0 * (1.0 - gain);
+        lines.push(format!("  {least} to {most} samples a pixel, by what {stage} told: about {saved:.0} % less work"));
     }
     if let (Some(rays), Some(triangles)) = (&image.rays, image.triangles) {
         let (camera, bounce, shadow) = (rays.camera, rays.bounce, rays.shadow);
