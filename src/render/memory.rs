@@ -87,7 +87,7 @@ pub struct Encoded {
 }
 
 /// The program with the threads that read and write beside rendering; Embree with its TBB, once opened. Measured.
-const PROGRAM: u64 = 12 << 20;
+const PROGRAM: u64 = 14 << 20;
 const EMBREE_LIBRARY: u64 = 7 << 20;
 /// A thread with its paths (`integrator::pool`, about 200 bytes a path) and its stack as far as used.
 const THREAD: u64 = 1 << 20;
