@@ -3,13 +3,14 @@
 use super::feed::Which;
 use super::leaf::Nearest;
 use super::node::WIDTH;
-use super::packet::{IntersectPackets, OccludedPackets};
+use super::packet::{AtRest, IntersectPackets, OccludedPackets, Others, Specials};
 use super::ray::{RayLanes, box_ends};
 use super::sort::{IsMixed, Sort, Sorted};
 use super::traverse::{INTERLEAVED, Query, trace};
 use super::{Space, WideBvh};
 use crate::accel::{HitBatch, MISS, RayBatch};
 use simd::{Float, Kernel, Lanes, Mask, dispatch};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Scattered rays that reach what is not at rest, from which on they are put in order and go in packets.
@@ -18,22 +19,18 @@ const MANY: usize = 512;
 /// Nearest hits of `rays[range]`.
 pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: bool, hits: &mut HitBatch) {
     let mut left = Vec::new();
-    let packets = |others, hits: &mut HitBatch, left: &mut Vec<u32>| {
-        left.clear();
-        dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range: range.clone(), others, hits, left });
-    };
     if bvh.world.is_empty() {
         hits.t[range.clone()].copy_from_slice(&rays.t_max[range.clone()]);
         hits.primitive[range.clone()].fill(MISS);
     } else if coherent {
-        packets(false, &mut *hits, &mut left);
+        packets::<AtRest>(bvh, rays, range.clone(), &mut *hits, &mut left);
         run(bvh, &bvh.world, rays, &left[..], &mut Closest(&mut *hits));
     } else {
         run(bvh, &bvh.world, rays, range.clone(), &mut Closest(&mut *hits));
     }
     let Some(others) = &bvh.others else { return };
     if coherent {
-        packets(true, &mut *hits, &mut left);
+        packets::<Others>(bvh, rays, range, &mut *hits, &mut left);
         return run(bvh, others, rays, &left[..], &mut Closer(hits));
     }
     left.clear();
@@ -48,10 +45,7 @@ pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: 
     for (k, &i) in from[..n].iter().enumerate() {
         found.copy(k, hits, i as usize);
     }
-    left.clear();
-    let (hits_of_sorted, range) = (&mut found, 0..n);
-    let packets = IntersectPackets { bvh, rays: &rays, range, others: true, hits: hits_of_sorted, left: &mut left };
-    dispatch(bvh.packet_level, packets);
+    packets::<Others>(bvh, &rays, 0..n, &mut found, &mut left);
     run(bvh, others, &rays, &left[..], &mut Closer(&mut found));
     for (k, &i) in from[..n].iter().enumerate() {
         hits.copy(i as usize, &found, k);
@@ -72,17 +66,23 @@ pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
 }
 
 fn occluded_in_packets(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
-    let mut left = Vec::new();
-    let mut through = |world: &Space, others: bool| {
-        left.clear();
-        let (occluded, left) = (&mut *occluded, &mut left);
-        dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, others, occluded, left });
-        run(bvh, world, rays, &left[..], &mut Any(occluded));
-    };
-    through(&bvh.world, false);
+    occluded_by::<AtRest>(bvh, &bvh.world, rays, n, occluded);
     if let Some(others) = &bvh.others {
-        through(others, true);
+        occluded_by::<Others>(bvh, others, rays, n, occluded);
     }
+}
+
+fn occluded_by<S: Specials>(bvh: &WideBvh, world: &Space, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
+    let mut left = Vec::new();
+    let (found, specials) = (&mut *occluded, PhantomData::<S>);
+    dispatch(bvh.packet_level, OccludedPackets { bvh, rays, n, occluded: found, left: &mut left, specials });
+    run(bvh, world, rays, &left[..], &mut Any(occluded));
+}
+
+/// Sends `rays[range]` through one of the two in packets; those that are better off alone are `left`.
+fn packets<S: Specials>(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, hits: &mut HitBatch, left: &mut Vec<u32>) {
+    left.clear();
+    dispatch(bvh.packet_level, IntersectPackets { bvh, rays, range, hits, left, specials: PhantomData::<S> });
 }
 
 /// Which of `rays[range]` enter the box around `others` before `ends`.

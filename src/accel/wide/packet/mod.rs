@@ -20,6 +20,7 @@ mod specials;
 
 pub use nearest::IntersectPackets;
 pub use occluded::OccludedPackets;
+pub use specials::{AtRest, Others, Specials};
 
 use super::build::MAX_DEPTH;
 use super::leaf::{Asked, sheared};

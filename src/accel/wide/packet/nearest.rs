@@ -1,6 +1,6 @@
 //! Nearest hits of packets.
 
-use super::specials::{AtRest, Others, Specials};
+use super::specials::Specials;
 use super::{FEW, MAX_LANES, STACK, Walk, Worth, ask_for, corner, leave, passing};
 use crate::accel::wide::WideBvh;
 use crate::accel::wide::leaf::cross;
@@ -8,6 +8,7 @@ use crate::accel::wide::node::{Child, FILTERED, LEAF_ROWS, Leaves, WIDTH};
 use crate::accel::wide::ray::{RayLanes, Shape, box_ends};
 use crate::accel::{HitBatch, MISS, RayBatch};
 use simd::{Float, Kernel, Lanes, Mask, Uint};
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// A child still to be visited.
@@ -24,15 +25,19 @@ impl Entry {
     pub const NONE: Self = Self { enter: [0.0; MAX_LANES], child: Child::inner(0) };
 }
 
-/// Nearest hits of `rays[range]` as far as packets find them; the others are `left`.
-pub struct IntersectPackets<'a> {
+/// Nearest hits of `rays[range]` as far as packets find them; the others are `left`. With [`AtRest`] those with the
+/// world's triangles at rest; with [`Others`] those with everything else, where that is nearer than the hits so far. A
+/// kernel each: with both in one function camera rays were 3 % slower.
+///
+/// [`AtRest`]: super::AtRest
+/// [`Others`]: super::Others
+pub struct IntersectPackets<'a, S> {
     pub bvh: &'a WideBvh,
     pub rays: &'a RayBatch,
     pub range: Range<usize>,
-    /// False: with the world's triangles at rest. True: with everything else, where that is nearer than the hits so far.
-    pub others: bool,
     pub hits: &'a mut HitBatch,
     pub left: &'a mut Vec<u32>,
+    pub specials: PhantomData<S>,
 }
 
 /// Hits so far, in lanes.
@@ -83,21 +88,19 @@ impl<L: Lanes> NearestLanes<L> {
     }
 }
 
-impl Kernel for IntersectPackets<'_> {
+impl<S: Specials> Kernel for IntersectPackets<'_, S> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        match &self.bvh.others {
-            Some(_) if self.others => packets::<L, Others>(self, &mut Others::new()),
-            _ => packets::<L, AtRest>(self, &mut AtRest),
-        }
+        packets::<L, S>(self);
     }
 }
 
 #[inline(always)]
-fn packets<L: Lanes, S: Specials>(query: IntersectPackets<'_>, specials: &mut S) {
+fn packets<L: Lanes, S: Specials>(query: IntersectPackets<'_, S>) {
     let IntersectPackets { bvh, rays, range, hits, left, .. } = query;
+    let specials = &mut S::new();
     let space = if S::SOME { bvh.others.as_ref().unwrap_or(&bvh.world) } else { &bvh.world };
     let bounds = space.tree.nodes[space.root.node()].bounds();
     let mut stack = [Entry::NONE; STACK];

@@ -1,6 +1,6 @@
 //! Whether anything stops the rays of packets.
 
-use super::specials::{AtRest, Others, Specials};
+use super::specials::Specials;
 use super::{FEW, STACK, Walk, Worth, ask_for, corner, leave, passing};
 use crate::accel::RayBatch;
 use crate::accel::wide::WideBvh;
@@ -8,36 +8,38 @@ use crate::accel::wide::leaf::cross;
 use crate::accel::wide::node::{Child, FILTERED, LEAF_ROWS, Leaves, WIDTH};
 use crate::accel::wide::ray::{RayLanes, Shape, box_ends};
 use simd::{Float, Kernel, Lanes, Mask};
+use std::marker::PhantomData;
 
 /// A child still to be visited, and by which rays.
 pub type Open = (Child, u32);
 
-/// Whether anything is hit by `rays[..n]`, as far as packets find out; the others are `left`.
-pub struct OccludedPackets<'a> {
+/// Whether anything is hit by `rays[..n]`, as far as packets find out; the others are `left`. With [`AtRest`] by the
+/// world's triangles at rest; with [`Others`] by everything else, of those that nothing stopped so far.
+///
+/// [`AtRest`]: super::AtRest
+/// [`Others`]: super::Others
+pub struct OccludedPackets<'a, S> {
     pub bvh: &'a WideBvh,
     pub rays: &'a RayBatch,
     pub n: usize,
-    /// False: by the world's triangles at rest. True: by everything else, of those that nothing stopped so far.
-    pub others: bool,
     pub occluded: &'a mut [u8],
     pub left: &'a mut Vec<u32>,
+    pub specials: PhantomData<S>,
 }
 
-impl Kernel for OccludedPackets<'_> {
+impl<S: Specials> Kernel for OccludedPackets<'_, S> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        match &self.bvh.others {
-            Some(_) if self.others => packets::<L, Others>(self, &mut Others::new()),
-            _ => packets::<L, AtRest>(self, &mut AtRest),
-        }
+        packets::<L, S>(self);
     }
 }
 
 #[inline(always)]
-fn packets<L: Lanes, S: Specials>(query: OccludedPackets<'_>, specials: &mut S) {
+fn packets<L: Lanes, S: Specials>(query: OccludedPackets<'_, S>) {
     let OccludedPackets { bvh, rays, n, occluded, left, .. } = query;
+    let specials = &mut S::new();
     let space = if S::SOME { bvh.others.as_ref().unwrap_or(&bvh.world) } else { &bvh.world };
     let bounds = space.tree.nodes[space.root.node()].bounds();
     let mut stack = [(Child::inner(0), 0); STACK];

@@ -19,6 +19,9 @@ pub trait Specials {
     /// Whether there may be anything.
     const SOME: bool;
 
+    /// With what it needs.
+    fn new() -> Self;
+
     /// Updates `nearest` in `lanes` by special `index` of the space of `walk`.
     fn meet<L: Lanes>(
         &mut self,
@@ -41,6 +44,11 @@ impl Specials for AtRest {
     const SOME: bool = false;
 
     #[inline(always)]
+    fn new() -> Self {
+        Self
+    }
+
+    #[inline(always)]
     fn meet<L: Lanes>(&mut self, _: &Walk<'_>, _: usize, _: L::F, _: u32, _: &mut Worth, _: &mut NearestLanes<L>) {}
 
     #[inline(always)]
@@ -54,6 +62,11 @@ struct InObject;
 
 impl Specials for InObject {
     const SOME: bool = true;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self
+    }
 
     #[inline(always)]
     fn meet<L: Lanes>(
@@ -80,16 +93,14 @@ pub struct Others {
     open: [Open; INNER_STACK],
 }
 
-impl Others {
-    /// With stacks for placed objects.
-    #[inline(always)]
-    pub fn new() -> Self {
-        Self { entries: [Entry::NONE; INNER_STACK], open: [(Child::inner(0), 0); INNER_STACK] }
-    }
-}
-
 impl Specials for Others {
     const SOME: bool = true;
+
+    /// With stacks for placed objects.
+    #[inline(always)]
+    fn new() -> Self {
+        Self { entries: [Entry::NONE; INNER_STACK], open: [(Child::inner(0), 0); INNER_STACK] }
+    }
 
     #[inline(always)]
     fn meet<L: Lanes>(
