@@ -50,7 +50,7 @@ const SHARED: u32 = 3;
 
 /// How many rays shared the visits of a batch's packets so far. What is traced how changes no hit.
 #[derive(Default)]
-struct Worth {
+pub struct Worth {
     visits: u32,
     rays: u32,
 }
@@ -71,7 +71,7 @@ impl Worth {
 
 /// Where a packet is.
 #[derive(Clone, Copy)]
-struct Walk<'a> {
+pub struct Walk<'a> {
     bvh: &'a WideBvh,
     space: &'a Space,
     rays: &'a RayBatch,
