@@ -88,6 +88,8 @@ pub struct Base<'e, L: Lanes, K: Extent> {
     is_seen: L::M,
     /// Some lane has a specular lobe. Only a shortcut: a lane's bits must not depend on its neighbours.
     has_specular: bool,
+    /// Some lane of those has a dielectric layer. Only a shortcut as well: the layer counts for nothing in metals.
+    has_layer: bool,
 }
 
 /// A sampled local direction.
@@ -117,6 +119,8 @@ impl<'e, L: Lanes, K: Extent> Base<'e, L, K> {
         let is_seen = is_diffuse | wo.z.gt(zero);
         let wo = V3::<L>::new(wo.x, wo.y, wo.z.max(L::F::splat(1e-6)));
         let opaque = one - metallic;
+        // Only what is plain has lanes without a layer side by side.
+        let has_layer = K::IS_RICH || (has_specular & opaque.gt(zero)).any();
         let has_specular = has_specular.any();
         let smooth = roughness * roughness;
         let is_delta = smooth.lt(L::F::splat(DELTA_ALPHA)) & !is_diffuse;
@@ -155,6 +159,7 @@ impl<'e, L: Lanes, K: Extent> Base<'e, L, K> {
             is_diffuse,
             is_seen,
             has_specular,
+            has_layer,
         };
         let extras = if K::IS_RICH { surface.extras.as_ref() } else { None };
         if !has_specular && extras.is_none() {
@@ -307,8 +312,11 @@ impl<'e, L: Lanes, K: Extent> Base<'e, L, K> {
         let all = V3::<L>::splat([1.0; 3]);
         let c = c.max(zero);
         let s5 = pow5((one - c).max(zero));
-        let rise = self.rise(c, s5);
         let mut metal = self.base + (all - self.base).scale(s5);
+        if !self.has_layer {
+            return (metal, V3::zero(), V3::zero());
+        }
+        let rise = self.rise(c, s5);
         let mut layer = (self.f0 + (all - self.f0).scale(rise)).scale(self.weight).max(V3::zero());
         let mut boundary = layer;
         if let Some(through) = self.through.get() {
@@ -411,8 +419,8 @@ impl<'e, L: Lanes, K: Extent> Base<'e, L, K> {
         let mut diffuse = self.diffuse;
         if self.is_full {
             let albedo = self.albedo_toward(up);
-            let under = self.under(up, albedo);
-            diffuse = self.diffuse * under + self.multiple.scale(one - albedo[0]);
+            let again = self.multiple.scale(one - albedo[0]);
+            diffuse = if self.has_layer { self.diffuse * self.under(up, albedo) + again } else { again };
         } else {
             diffuse = diffuse.scale(one - layer.max_component());
         }

@@ -17,8 +17,11 @@ impl<L: Lanes, K: Extent> Base<'_, L, K> {
         if !self.is_full {
             return [L::F::one(), pow5(L::F::one() - w.z.min(L::F::one()))];
         }
-        let found = self.energy.albedo::<L>(&self.row, w.z);
-        let (mut white, mut found_rise) = (found.white, found.rise);
+        let mut white = self.energy.white::<L>(&self.row, w.z);
+        if !self.has_layer {
+            return [L::F::one().or_else(self.is_delta, white), L::F::zero()];
+        }
+        let mut found_rise = self.energy.rise::<L>(&self.row, w.z);
         if let Some(stretched) = self.stretched.get() {
             let [own, schlick] = self.energy.stretched::<L>(stretched, w);
             let own_rise = self.energy.stretched_rise::<L>(&self.row_toward(w), w.z, schlick);

@@ -129,15 +129,6 @@ impl<L: Lanes> Row<L> {
     }
 }
 
-/// The albedo towards one direction.
-#[derive(Clone, Copy)]
-pub struct Albedo<L: Lanes> {
-    /// Of GGX reflecting everything.
-    pub white: L::F,
-    /// How far Fresnel's curve has risen from normal incidence (0) to 1, on average over what is reflected.
-    pub rise: L::F,
-}
-
 impl Default for Energy {
     fn default() -> Self {
         Self::new(Brdf::Full)
@@ -253,18 +244,21 @@ impl Energy {
         Row { alpha, row: at, fy, ..*row }
     }
 
-    /// The albedo towards cosine `mu` > 0.
+    /// Albedo towards cosine `mu` > 0 of GGX reflecting everything.
     #[inline(always)]
-    pub fn albedo<L: Lanes>(&self, row: &Row<L>, mu: L::F) -> Albedo<L> {
-        let one = L::F::one();
-        let x = (mu * (one + row.alpha) / (mu + row.alpha)).sqrt();
+    pub fn white<L: Lanes>(&self, row: &Row<L>, mu: L::F) -> L::F {
+        let x = (mu * (L::F::one() + row.alpha) / (mu + row.alpha)).sqrt();
         let (i, fx) = cell::<L>(x, SIDE);
-        let first = row.row * L::U::splat(SIDE as u32 - 1);
-        let white = corners::<L>(&self.white, first + i, fx, row.fy);
+        corners::<L>(&self.white, row.row * L::U::splat(SIDE as u32 - 1) + i, fx, row.fy)
+    }
+
+    /// How far Fresnel's curve has risen from normal incidence (0) to 1, on average over what is reflected towards cosine
+    /// `mu` > 0.
+    #[inline(always)]
+    pub fn rise<L: Lanes>(&self, row: &Row<L>, mu: L::F) -> L::F {
         let (i, fx) = cell::<L>(mu.sqrt(), SIDE);
-        let class = row.class * L::U::splat(CELLS as u32);
-        let rise = corners::<L>(&self.rise, class + first + i, fx, row.fy);
-        Albedo { white, rise }
+        let first = row.class * L::U::splat(CELLS as u32) + row.row * L::U::splat(SIDE as u32 - 1);
+        corners::<L>(&self.rise, first + i, fx, row.fy)
     }
 
     /// What a rough boundary reflects and lets through of white light together, seen at cosine `mu` > 0 from the side

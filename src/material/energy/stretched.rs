@@ -155,8 +155,8 @@ impl Energy {
     pub fn stretched_rise<L: Lanes>(&self, round: &Row<L>, mu: L::F, schlick: L::F) -> L::F {
         let of_round = Row { class: L::U::splat(self.stretched.schlick), ..*round };
         let inside = |v: L::F| v.max(L::F::splat(1e-5)).min(L::F::splat(1.0 - 1e-5));
-        let power = ln::<L>(inside(schlick)) / ln::<L>(inside(self.albedo(&of_round, mu).rise));
-        let rise = self.albedo(round, mu).rise.max(L::F::splat(1e-9));
+        let power = ln::<L>(inside(schlick)) / ln::<L>(inside(self.rise(&of_round, mu)));
+        let rise = self.rise(round, mu).max(L::F::splat(1e-9));
         exp::<L>(ln::<L>(rise) * power).min(L::F::one())
     }
 }
