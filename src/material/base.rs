@@ -88,7 +88,8 @@ pub struct Base<'e, L: Lanes, K: Extent> {
     is_seen: L::M,
     /// Some lane has a specular lobe. Only a shortcut: a lane's bits must not depend on its neighbours.
     has_specular: bool,
-    /// Some lane of those has a dielectric layer. Only a shortcut as well: the layer counts for nothing in metals.
+    /// Some lane of those has a dielectric layer. Only a shortcut as well: the layer counts for nothing in metals (a box of
+    /// nothing but metal: 0.93 of the time).
     has_layer: bool,
 }
 
