@@ -39,7 +39,7 @@ pub fn intersect(bvh: &WideBvh, rays: &RayBatch, range: Range<usize>, coherent: 
     if left.len() < MANY {
         return run(bvh, others, rays, &left[..], &mut Closer(hits));
     }
-    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, which: &left });
+    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n: left.len(), which: Some(&left) });
     let n = left.len();
     let mut found = HitBatch::new(n);
     for (k, &i) in from[..n].iter().enumerate() {
@@ -58,8 +58,7 @@ pub fn occluded(bvh: &WideBvh, rays: &RayBatch, n: usize, occluded: &mut [u8]) {
     if !dispatch(bvh.packet_level, IsMixed { rays, n, scene }) {
         return occluded_in_packets(bvh, rays, n, occluded);
     }
-    let all: Vec<u32> = (0..n as u32).collect();
-    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, which: &all });
+    let Sorted { rays, from } = dispatch(bvh.packet_level, Sort { rays, n, which: None });
     let mut found = vec![0; n];
     occluded_in_packets(bvh, &rays, n, &mut found);
     from.iter().zip(found).for_each(|(&i, o)| occluded[i as usize] = o);

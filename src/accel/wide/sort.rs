@@ -56,10 +56,11 @@ pub struct Sorted {
     pub from: Buffer<u32>,
 }
 
-/// Puts those of `rays` that are `which` in order.
+/// Puts `n` of `rays` in order: those that are `which`, or the first.
 pub struct Sort<'a> {
     pub rays: &'a RayBatch,
-    pub which: &'a [u32],
+    pub n: usize,
+    pub which: Option<&'a [u32]>,
 }
 
 impl Kernel for Sort<'_> {
@@ -67,8 +68,7 @@ impl Kernel for Sort<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Sorted {
-        let Self { rays, which } = self;
-        let n = which.len();
+        let Self { rays, n, which } = self;
         let mut kinds = Buffer::<u32>::new(n);
         for at in (0..n).step_by(L::N) {
             kind::<L>(rays, which, at).store(&mut kinds, at);
@@ -79,9 +79,9 @@ impl Kernel for Sort<'_> {
             next[k + 1] += next[k];
         }
         let mut from = Buffer::<u32>::new(n);
-        for (&i, &k) in which.iter().zip(&kinds[..n]) {
+        for (place, &k) in kinds[..n].iter().enumerate() {
             let to = &mut next[k as usize % KINDS];
-            from[*to] = i;
+            from[*to] = which.map_or(place as u32, |which| which[place]);
             *to += 1;
         }
         let mut sorted = RayBatch::new(n);
@@ -103,15 +103,18 @@ impl Kernel for Sort<'_> {
 
 /// Octant and largest axis. What is no ray is of any kind.
 #[inline(always)]
-fn kind<L: Lanes>(rays: &RayBatch, which: &[u32], at: usize) -> L::U {
-    let i = if at + L::N <= which.len() {
-        L::U::load(which, at)
-    } else {
-        let mut last = [0; MAX_LANES];
-        last[..which.len() - at].copy_from_slice(&which[at..]);
-        L::U::load(&last, 0)
+fn kind<L: Lanes>(rays: &RayBatch, which: Option<&[u32]>, at: usize) -> L::U {
+    let (x, y, z) = match which {
+        // Gathered as well, shadow rays to a lamp have 0.98 of the speed.
+        None => (L::F::load(&rays.dx, at), L::F::load(&rays.dy, at), L::F::load(&rays.dz, at)),
+        Some(which) => {
+            let mut numbers = [0; MAX_LANES];
+            let n = L::N.min(which.len() - at);
+            numbers[..n].copy_from_slice(&which[at..at + n]);
+            let i = L::U::load(&numbers, 0);
+            (i.gather(&rays.dx), i.gather(&rays.dy), i.gather(&rays.dz))
+        }
     };
-    let (x, y, z) = (i.gather(&rays.dx), i.gather(&rays.dy), i.gather(&rays.dz));
     let bit = |v: u32| L::U::splat(v);
     let zero = bit(0);
     let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
@@ -148,7 +151,8 @@ mod tests {
             if !level.is_available() {
                 continue;
             }
-            let Sorted { rays: sorted, from } = dispatch(level, Sort { rays: &rays, which: &which });
+            let Sorted { rays: sorted, from } =
+                dispatch(level, Sort { rays: &rays, n: which.len(), which: Some(&which) });
             let kind = |d: Vec3| {
                 let a = d.abs();
                 let axis = if a.x >= a.y && a.x >= a.z { 1 } else { 2 * u32::from(a.y >= a.z) };
@@ -170,6 +174,16 @@ mod tests {
             places.sort_unstable();
             assert_eq!(places, which, "{}", level.name());
         }
+    }
+
+    #[test]
+    fn the_first_rays_are_sorted_as_a_list_of_them() {
+        let (rays, list) = (rays(1001), (0..700).collect::<Vec<u32>>());
+        let level = Level::best();
+        let first = dispatch(level, Sort { rays: &rays, n: 700, which: None });
+        let listed = dispatch(level, Sort { rays: &rays, n: 700, which: Some(&list) });
+        assert_eq!(first.from[..700], listed.from[..700]);
+        assert_eq!(first.rays.dx[..700], listed.rays.dx[..700]);
     }
 
     #[test]
