@@ -7,7 +7,8 @@
 //! its nodes lie behind those of the first and lead to it.
 //!
 //! `queries` sends a batch through `packet`s, as far as its rays belong together, and the others one by one through
-//! `traverse`, which `feed` gives them to: first through the world's triangles at rest, then through the rest. `ray` tests boxes, `leaf` triangles.
+//! `traverse`, which `feed` gives them to: first through the world's triangles at rest, then through the rest. `ray` tests
+//! boxes, `leaf` triangles.
 
 mod bins;
 mod build;

@@ -3,7 +3,7 @@
 use super::feed::Which;
 use super::leaf::Nearest;
 use super::node::WIDTH;
-use super::packet::{AtRest, IntersectPackets, OccludedPackets, Others, Specials};
+use super::packet::{AtRest, IntersectPackets, OccludedPackets, Others, Specials, leave};
 use super::ray::{RayLanes, box_ends};
 use super::sort::{IsMixed, Sort, Sorted};
 use super::traverse::{INTERLEAVED, Query, trace};
@@ -108,10 +108,7 @@ impl Kernel for Reaching<'_> {
                 let packet = RayLanes::<L>::new(rays, at, &others.tree.bounds);
                 bits &= packet.valid & packet.enter(&bounds, box_ends::<L>(L::F::load(ends, at)));
             }
-            while bits != 0 {
-                reaching.push(at as u32 + bits.trailing_zeros());
-                bits &= bits - 1;
-            }
+            leave(reaching, at, bits);
         }
     }
 }

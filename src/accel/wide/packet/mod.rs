@@ -102,7 +102,7 @@ fn ask_for(space: &Space, child: Child) {
 
 /// Appends the rays from `at` on that are in `lanes`.
 #[inline(always)]
-fn leave(left: &mut Vec<u32>, at: usize, mut lanes: u32) {
+pub fn leave(left: &mut Vec<u32>, at: usize, mut lanes: u32) {
     while lanes != 0 {
         left.push(at as u32 + lanes.trailing_zeros());
         lanes &= lanes - 1;
