@@ -3,11 +3,13 @@
 
 mod builder;
 mod check;
+mod motion;
 mod source;
 
 pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
 pub use builder::SceneBuilder;
 pub(crate) use check::MAX_COORDINATE;
+pub use motion::{Motion, Pose};
 pub use source::{SourceFile, Stamp};
 
 use crate::camera::Camera;
@@ -67,6 +69,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Cameras with their place.
     pub cameras: Vec<Camera>,
+    /// What of it moves while the shutter is open; empty for a scene at rest.
+    pub motion: Motion,
     /// Which scene of the file this is.
     pub index: usize,
     /// The files it was made from, each name once, in the order in which they were looked for: the input first.
