@@ -127,7 +127,7 @@ pub fn ray_sets(
 /// Each batch is what a worker sends first of a 32x32 tile at 64 samples a pixel, from another place of its tile; the
 /// tiles are spread evenly over the picture.
 fn primary(prepared: &Prepared, camera: &Camera, batches: usize, seed: u64) -> Vec<RayBatch> {
-    let camera = CameraRays::new(camera, PICTURE[0], PICTURE[1], prepared.origin);
+    let camera = CameraRays::new(camera, &[], PICTURE[0], PICTURE[1], prepared.origin);
     let tiles = PICTURE.map(|side| (side / TILE) as usize);
     let (count, pixels) = (tiles[0] * tiles[1], POOL as u32 / SAMPLES);
     let batch = |b: usize| {
@@ -171,7 +171,7 @@ impl Kernel for Generate<'_> {
             let u = key.group(L::U::splat(dims::CAMERA));
             let x = L::F::load(&rays.ox, at) + filter.offset::<L>(u[0]);
             let y = L::F::load(&rays.oy, at) + filter.offset::<L>(u[1]);
-            let (origin, direction): (V3<L>, V3<L>) = camera.ray::<L>(x, y);
+            let (origin, direction): (V3<L>, V3<L>) = camera.ray::<L>(x, y, L::F::zero());
             origin.x.store(&mut rays.ox, at);
             origin.y.store(&mut rays.oy, at);
             origin.z.store(&mut rays.oz, at);
@@ -316,7 +316,8 @@ impl Kernel for Choose<'_> {
             let p = V3::<L>::new(L::F::load(&from[0], at), L::F::load(&from[1], at), L::F::load(&from[2], at));
             let n = V3::<L>::new(L::F::load(&normal[0], at), L::F::load(&normal[1], at), L::F::load(&normal[2], at));
             let u = [L::F::load(&u[0], at), L::F::load(&u[1], at), L::F::load(&u[2], at), L::F::load(&u[3], at)];
-            let light = tables.lights.sample(&tables.lights.receiver::<L>(p, n), u, tables.sources(), scratch);
+            let light =
+                tables.lights.sample(&tables.lights.receiver::<L>(p, n), u, L::F::zero(), tables.sources(), scratch);
             light.wi.x.store(&mut towards[0], at);
             light.wi.y.store(&mut towards[1], at);
             light.wi.z.store(&mut towards[2], at);

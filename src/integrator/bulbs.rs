@@ -52,6 +52,8 @@ pub struct BulbRay<L: Lanes> {
     pub direction: V3<L>,
     /// To behind the bulb, metres.
     pub t_max: L::F,
+    /// Of the shutter; 0 where nothing moves.
+    pub time: L::F,
     /// What arrives of a radiance of 1.
     pub weight: V3<L>,
     /// Number of the light.
@@ -69,7 +71,7 @@ impl BulbRays {
     #[inline(always)]
     pub fn push<L: Lanes>(&mut self, keep: L::M, ray: &BulbRay<L>) {
         let to = self.n;
-        let BulbRay { origin, direction, t_max, weight, sought, medium, scatterings, slot } = *ray;
+        let BulbRay { origin, direction, t_max, time, weight, sought, medium, scatterings, slot } = *ray;
         origin.x.compress(keep, &mut self.rays.ox, to);
         origin.y.compress(keep, &mut self.rays.oy, to);
         origin.z.compress(keep, &mut self.rays.oz, to);
@@ -84,6 +86,7 @@ impl BulbRays {
         medium.compress(keep, &mut self.medium, to);
         scatterings.compress(keep, &mut self.scatterings, to);
         slot.compress(keep, &mut self.slot, to);
+        time.compress(keep, &mut self.rays.time, to);
         self.n += keep.count();
     }
 }
@@ -130,7 +133,8 @@ fn arrive<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, bulbs: &BulbRa
         return;
     }
     let direction = load3::<L>(&bulbs.rays.dx, &bulbs.rays.dy, &bulbs.rays.dz, at);
-    let si = interact::<L>(tables, &bulbs.hits, at, -direction, primitive, hit);
+    let time = L::F::load(&bulbs.rays.time, at);
+    let si = interact::<L>(tables, &bulbs.hits, at, (-direction, time), primitive, hit);
     let met = hit & si.triangle.light.eq(L::U::load(&bulbs.sought, at));
     let (radiance, lit) = shining(tables, &si, met);
     if !lit.any() {

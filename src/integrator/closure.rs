@@ -87,20 +87,21 @@ fn stored_footprints<L: Lanes>(si: &Interaction<L>) -> Option<[[f32; 16]; MAX_UV
     Some(stored)
 }
 
-/// The closure of hit `at` seen from `wo`, whose material has what only some have, and whether light may get through it.
+/// The closure of hit `at` seen from `wo` at `time`, whose material has what only some have, and whether light may get through it.
 /// `footprints`: see [`crate::math::UvSets::with_footprints`].
 #[inline(never)]
 fn closure_of_one<'t>(
     tables: &'t SceneTables,
     hits: &HitBatch,
     at: usize,
-    wo: V3<Scalar>,
+    (wo, time): (V3<Scalar>, f32),
     eta: f32,
     footprints: Option<[f32; MAX_UV_SETS]>,
 ) -> (Layered<'t>, bool) {
     let active = <Scalar as Lanes>::M::first(1);
     let primitive = <Scalar as Lanes>::U::load(&hits.primitive, at);
-    let mut si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    let time = <Scalar as Lanes>::F::splat(time);
+    let mut si = interact::<Scalar>(tables, hits, at, (wo, time), primitive, active);
     if let Some(footprints) = footprints {
         // Shadow rays go through thin glass without a cone, and what they find must be what paths find.
         let inside = MediumTable::inside::<Scalar>(si.triangle.material);
@@ -128,23 +129,23 @@ fn closure_of_one<'t>(
     (Layered::new(&surface, &view, diffuse_normal, materials.energy()), transmits)
 }
 
-/// What hit `at` lets straight through to the viewer in direction `wo`, and where a ray goes on behind it; `None` where that
+/// What hit `at` of a ray at `time` lets straight through to the viewer in direction `wo`, and where a ray goes on behind it; `None` where that
 /// is no thin glass.
 #[inline(never)]
 pub(super) fn pane(
     tables: &SceneTables,
     hits: &HitBatch,
     at: usize,
-    wo: V3<Scalar>,
+    (wo, time): (V3<Scalar>, f32),
 ) -> Option<(V3<Scalar>, V3<Scalar>)> {
     let active = <Scalar as Lanes>::M::first(1);
     let primitive = <Scalar as Lanes>::U::load(&hits.primitive, at);
-    let si = interact::<Scalar>(tables, hits, at, wo, primitive, active);
+    let si = interact::<Scalar>(tables, hits, at, (wo, <Scalar as Lanes>::F::splat(time)), primitive, active);
     let inside = MediumTable::inside::<Scalar>(si.triangle.material);
     if !tables.media.is_thin_glass::<Scalar>(inside, active).any() {
         return None;
     }
-    let (closure, _) = closure_of_one(tables, hits, at, wo, 1.0, None);
+    let (closure, _) = closure_of_one(tables, hits, at, (wo, time), 1.0, None);
     Some((closure.straight(), si.behind()))
 }
 
@@ -168,11 +169,12 @@ impl<'t, L: Lanes> Closure<'t, L> {
         if !rich.any() {
             return;
         }
-        let (mut wo, mut etas) = ([[0.0; 16]; 3], [0.0; 16]);
+        let (mut wo, mut etas, mut times) = ([[0.0; 16]; 3], [0.0; 16], [0.0; 16]);
         si.wo.x.store(&mut wo[0], 0);
         si.wo.y.store(&mut wo[1], 0);
         si.wo.z.store(&mut wo[2], 0);
         eta.store(&mut etas, 0);
+        si.time.store(&mut times, 0);
         let footprints = stored_footprints(si);
         let (mut layered, mut transmits) = (Vec::with_capacity(rich.count()), 0);
         let mut bits = rich.bits();
@@ -181,7 +183,7 @@ impl<'t, L: Lanes> Closure<'t, L> {
             bits &= bits - 1;
             let wo = V3::splat([wo[0][lane], wo[1][lane], wo[2][lane]]);
             let seen = footprints.map(|sets| sets.map(|areas| areas[lane]));
-            let (one, goes_through) = closure_of_one(tables, hits, at + lane, wo, etas[lane], seen);
+            let (one, goes_through) = closure_of_one(tables, hits, at + lane, (wo, times[lane]), etas[lane], seen);
             transmits |= u32::from(goes_through) << lane;
             layered.push((lane, one));
         }

@@ -55,7 +55,7 @@ fn footprints_are_those_of_a_plane_that_faces_the_cone_and_of_a_tilted_one() {
             for degrees in [0.0_f64, 60.0, 85.0, 120.0] {
                 let (sin, cos) = degrees.to_radians().sin_cos();
                 let wo = V3::<L>::splat([sin as f32, 0.0, cos as f32]);
-                let si = interact::<L>(&tables, &hits, 0, wo, L::U::splat(0), all);
+                let si = interact::<L>(&tables, &hits, 0, (wo, L::F::zero()), L::U::splat(0), all);
                 let cone = Cone::<L>::load(&pool, 0, L::F::splat(30.0));
                 let found = cone.footprints(&tables, &si, all);
                 // 0.02 m + 30 m x 0.001, over the cosine; areas 1.5 and 4 on 4 m^2, all of them doubled.
@@ -125,14 +125,14 @@ fn camera_cones_have_the_solid_angle_of_their_pixel() {
 
         #[inline(always)]
         fn run<L: Lanes>(self) -> [f64; 2] {
-            let (_, direction) = self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]));
+            let (_, direction) = self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]), L::F::zero());
             let (width, spread) = self.0.cone::<L>(direction);
             [width, spread].map(|v| f64::from(v.first()))
         }
     }
     let of = |projection, pixel| {
         let camera = Camera { name: String::new(), world_from_camera: DMat4::IDENTITY, projection };
-        simd::dispatch(simd::Level::best(), Cones(CameraRays::new(&camera, 200, 100, DVec3::ZERO), pixel))
+        simd::dispatch(simd::Level::best(), Cones(CameraRays::new(&camera, &[], 200, 100, DVec3::ZERO), pixel))
     };
     let yfov = 1.2_f64;
     let perspective = Projection::Perspective { yfov, aspect_ratio: None };

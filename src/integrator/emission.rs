@@ -67,7 +67,7 @@ impl<L: Lanes> Part<L> for Emitted<'_, L> {
             return (le, lit);
         }
         let cos = si.wo.dot(si.triangle.ng).abs();
-        let density = tables.lights.density(light, si.p, si.wo, distance, cos);
+        let density = tables.lights.density(light, si.p, si.wo, distance, cos) / si.growth;
         let pmf = tables.lights.pmf::<L>(light, receiver::load(tables, from, at));
         let other: L::F = (pmf * density).masked(sampled);
         (le.scale(weight_of_remembered::<L>(prev_pdf, other)), lit)

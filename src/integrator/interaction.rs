@@ -4,6 +4,7 @@ use super::SceneTables;
 use super::terminator::lift;
 use crate::accel::HitBatch;
 use crate::math::{UvSets, V3, robust};
+use crate::shape::moving::Moved;
 use crate::shape::placement::Placed;
 use crate::shape::table::{NONE, Triangle, interpolate3};
 use simd::{Float, Lanes, Mask, Part, Uint};
@@ -14,6 +15,12 @@ pub(super) struct Interaction<L: Lanes> {
     pub triangle: Triangle<L>,
     /// Where it is placed, for what is read of it besides; `None` where that is the world in all lanes.
     pub placed: Option<Placed<L>>,
+    /// Where it moves by its vertices; `None` where it does not in all lanes.
+    pub moved: Option<Moved<L>>,
+    /// How many times the area that it has when the shutter opens.
+    pub growth: L::F,
+    /// Of the shutter, in [0, 1]; 0 where nothing moves.
+    pub time: L::F,
     /// Hit point, from barycentric coordinates.
     pub p: V3<L>,
     /// How far rays that leave are moved off the surface, metres.
@@ -41,24 +48,24 @@ pub(super) struct Interaction<L: Lanes> {
 
 /// Which placements were hit by the rays `at ..`: nobody asks in scenes where nothing is placed.
 #[inline(always)]
-fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, hit: L::M) -> Option<Placed<L>> {
+fn placed<L: Lanes>(tables: &SceneTables, hits: &HitBatch, at: usize, time: L::F, hit: L::M) -> Option<Placed<L>> {
     if tables.placements.is_empty() {
         return None;
     }
-    tables.placements.get::<L>(L::U::load(&hits.instance, at), hit)
+    tables.placements.get::<L>(L::U::load(&hits.instance, at), time, hit)
 }
 
-/// Geometry of the hits `at ..`, seen from the directions `wo` (unit).
+/// Geometry of the hits `at ..` of rays at `time`, seen from the directions `wo` (unit).
 #[inline(always)]
 pub(super) fn interact<L: Lanes>(
     tables: &SceneTables,
     hits: &HitBatch,
     at: usize,
-    wo: V3<L>,
+    (wo, time): (V3<L>, L::F),
     primitive: L::U,
     hit: L::M,
 ) -> Interaction<L> {
-    L::outline(Interact { tables, hits, at, wo, primitive, hit })
+    L::outline(Interact { tables, hits, at, wo, time, primitive, hit })
 }
 
 /// [`interact`].
@@ -67,6 +74,7 @@ struct Interact<'a, L: Lanes> {
     hits: &'a HitBatch,
     at: usize,
     wo: V3<L>,
+    time: L::F,
     primitive: L::U,
     hit: L::M,
 }
@@ -76,12 +84,19 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
 
     #[inline(always)]
     fn run(self) -> Interaction<L> {
-        let Self { tables, hits, at, wo, primitive, hit } = self;
+        let Self { tables, hits, at, wo, time, primitive, hit } = self;
         let zero = L::F::zero();
         let none = L::M::from_bits(0);
-        let triangle = tables.triangles.get::<L>(primitive);
+        let mut triangle = tables.triangles.get::<L>(primitive);
         let b = [L::F::load(&hits.u, at), L::F::load(&hits.v, at)];
-        let placed = placed::<L>(tables, hits, at, hit);
+        let placed = placed::<L>(tables, hits, at, time, hit);
+        let (mut moved, mut growth) = (None, L::F::one());
+        if !tables.triangles.moving.is_empty() {
+            moved = tables.triangles.moving.at::<L>(primitive, time, hit);
+            if let Some(moved) = &moved {
+                (triangle, growth) = tables.triangles.moving.moved(&triangle, moved);
+            }
+        }
         let (triangle, p, offset) = triangle.placed(&placed, triangle.point(b[0], b[1]));
         let front = wo.dot(triangle.ng).gt(zero);
         let ng = triangle.ng.or_else(front, -triangle.ng);
@@ -97,6 +112,11 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
                     color = a.color.or_else(has, color);
                 }
                 if tables.triangles.has_normals() {
+                    if let Some(moved) = &moved {
+                        a.corner_normals = tables.triangles.moving.normals(a.corner_normals, moved);
+                        let [n0, n1, n2] = a.corner_normals;
+                        a.normal = interpolate3(n0, n1, n2, b[0], b[1]).or_else(moved.lanes, a.normal);
+                    }
                     if let Some(placed) = &placed {
                         // At the corners, as when a mesh is merged: normals of one length are interpolated.
                         let [n0, n1, n2] = a.corner_normals;
@@ -113,7 +133,25 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
                 }
             }
         }
-        Interaction { triangle, placed, p, offset, origin, lifted, wo, ng, front, uvs, color, normal, has_normal, b }
+        Interaction {
+            triangle,
+            placed,
+            moved,
+            growth,
+            time,
+            p,
+            offset,
+            origin,
+            lifted,
+            wo,
+            ng,
+            front,
+            uvs,
+            color,
+            normal,
+            has_normal,
+            b,
+        }
     }
 }
 

@@ -57,7 +57,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
 ) -> Queued<L> {
     let Vertex { si, closure, crossing, receiver, start, beta, scatterings, limit, slot } = *vertex;
     let (zero, one) = (L::F::zero(), L::F::one());
-    let light = tables.lights.sample(receiver, u, tables.sources(), &mut pool.light_scratch);
+    let light = tables.lights.sample(receiver, u, si.time, tables.sources(), &mut pool.light_scratch);
     let value = closure.bsdf.eval(light.wi);
     let weight = one.or_else(light.is_hidden, weight::<L>(light.pdf, value.pdf, !closure.bsdf.is_glossy()));
     let mut arriving = (beta * value.f_cos * light.radiance).scale(weight / light.pdf);
@@ -92,6 +92,7 @@ pub(super) fn queue_light_sample<L: Lanes>(
                 origin: start,
                 direction,
                 t_max,
+                time: si.time,
                 weight: arriving,
                 sought: light.sought,
                 medium,
@@ -104,6 +105,9 @@ pub(super) fn queue_light_sample<L: Lanes>(
         let (left, excess) = limit.apply(arriving);
         excess.compress(cast, &mut pool.shadow_excess, pool.n_shadow);
         arriving = left;
+    }
+    if tables.moves() {
+        si.time.compress(cast, &mut pool.shadow.time, pool.n_shadow);
     }
     let direction = light.wi.or_else(light.is_distant, to_light);
     let t_max = L::F::splat(f32::INFINITY).or_else(light.is_distant, one);

@@ -63,6 +63,11 @@ impl SceneTables {
         Sources { triangles: &self.triangles, materials: &self.materials, textures: &self.textures }
     }
 
+    /// Whether anything that rays or light samples meet moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        !self.triangles.moving.is_empty() || self.placements.moves() || self.lights.moves()
+    }
+
     /// Whether any surface is shaded with another normal than its triangle's.
     pub(crate) fn has_shading_normals(&self) -> bool {
         self.triangles.has_normals() || self.triangles.has_tangents() || self.materials.has_bump()
@@ -93,4 +98,11 @@ pub struct PathTracer<'a> {
     pub frame: u32,
     /// Instructions for shading.
     pub level: Level,
+}
+
+impl PathTracer<'_> {
+    /// Whether paths have a time.
+    fn moves(&self) -> bool {
+        self.camera.moves() || self.tables.moves()
+    }
 }

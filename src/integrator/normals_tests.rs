@@ -77,7 +77,7 @@ impl Kernel for Look<'_> {
         }
         let wo = V3::<L>::splat((self.patch.eye - target).normalize().into());
         let all = L::M::first(L::N);
-        let si = interact::<L>(self.tables, &hits, 0, wo, L::U::splat(0), all);
+        let si = interact::<L>(self.tables, &hits, 0, (wo, L::F::zero()), L::U::splat(0), all);
         let direction = [L::F::splat(self.direction[0]), L::F::splat(self.direction[1])];
         let frame = anisotropy_frame(self.tables, &si, V3::<L>::splat(self.ns.into()), direction, all);
         let coat = coat_normal(self.tables, &si, all);

@@ -83,7 +83,8 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let limit = Limit::<L>::new(tracer.clamp, depth);
     let mut beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
     let wo = -load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
-    let mut si = interact::<L>(tables, &pool.hits, at, wo, primitive, hit);
+    let time = L::F::load(&pool.rays.time, at);
+    let mut si = interact::<L>(tables, &pool.hits, at, (wo, time), primitive, hit);
     let cone = if tables.textures.has_levels() {
         let cone = Cone::<L>::load(pool, at, L::F::load(&pool.hits.t, at));
         si.uvs = si.uvs.with_footprints(cone.footprints(tables, &si, hit));
@@ -229,6 +230,9 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
         coverage_key::<L>(key.pixel, key.sample, next.depth).compress(alive, &mut pool.rays.key, to);
     }
 
+    if tables.moves() {
+        time.compress(alive, &mut pool.rays.time, to);
+    }
     if let Some(crossing) = &crossing {
         crossing.follow(pool, counters, at, to, through & !straight, alive);
     }

@@ -75,8 +75,9 @@ impl<L: Lanes> Part<L> for SeeBalls<'_, '_, L> {
         let beta = load3::<L>(&pool.beta[0], &pool.beta[1], &pool.beta[2], at);
         let from = receiver::load::<L>(tables, &pool.from, at);
         let prev_pdf = L::F::load(&pool.prev_pdf, at);
+        let time = L::F::load(&pool.rays.time, at);
         for number in tables.lights.balls() {
-            let met = tables.lights.ball::<L>(number, origin, direction, from.as_ref());
+            let met = tables.lights.ball::<L>(number, (origin, direction), time, from.as_ref());
             let sees = scattered & met.meets & start.le(met.distance) & met.distance.lt(end);
             if !sees.any() {
                 continue;
@@ -111,8 +112,9 @@ impl<L: Lanes> Part<L> for SeeSuns<'_, '_, L> {
         let direction = load3::<L>(&pool.rays.dx, &pool.rays.dy, &pool.rays.dz, at);
         let from = receiver::load::<L>(tables, &pool.from, at);
         let prev_pdf = L::F::load(&pool.prev_pdf, at);
+        let time = L::F::load(&pool.rays.time, at);
         for number in tables.lights.suns() {
-            let met = tables.lights.sun::<L>(number, direction, from.as_ref());
+            let met = tables.lights.sun::<L>(number, direction, time, from.as_ref());
             let sees = scattered & met.meets;
             if !sees.any() {
                 continue;

@@ -78,7 +78,9 @@ fn pass_one(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize) {
     let direction = load3::<Scalar>(&pool.shadow.dx, &pool.shadow.dy, &pool.shadow.dz, at);
     let t_max = <Scalar as Lanes>::F::load(&pool.shadow.t_max, at);
     let key = <Scalar as Lanes>::U::load(&pool.shadow.key, at);
-    let Some((tint, origin)) = pane(tables, &glass.hits, at, -direction.normalized()) else { return };
+    let Some((tint, origin)) = pane(tables, &glass.hits, at, (-direction.normalized(), pool.shadow.time[at])) else {
+        return;
+    };
     let radiance = radiance * tint;
     let end = load3::<Scalar>(&glass.end[0], &glass.end[1], &glass.end[2], at);
     let direction = direction.or_else(!t_max.is_finite(), end - origin);
@@ -89,6 +91,9 @@ fn pass_one(tracer: &PathTracer<'_>, pool: &mut PathPool, at: usize) {
     }
     if tables.materials.has_alpha() {
         key.compress(passes, &mut pool.shadow.key, to);
+    }
+    if tables.moves() && passes.any() {
+        pool.shadow.time[to] = pool.shadow.time[at];
     }
     pool.push_shadow::<Scalar>(passes, (origin, direction, t_max), slot, radiance);
     if let Some(glass) = &mut pool.glass {

@@ -227,7 +227,12 @@ impl Kernel for Generate<'_, '_> {
             let u = key.group(L::U::splat(dims::CAMERA));
             let x = L::F::load(&pool.rays.ox, at) + tracer.filter.offset::<L>(u[0]);
             let y = L::F::load(&pool.rays.oy, at) + tracer.filter.offset::<L>(u[1]);
-            let (origin, direction): (V3<L>, V3<L>) = tracer.camera.ray::<L>(x, y);
+            let mut time = L::F::zero();
+            if tracer.moves() {
+                time = key.group(L::U::splat(dims::TIME))[0];
+                time.store(&mut pool.rays.time, at);
+            }
+            let (origin, direction): (V3<L>, V3<L>) = tracer.camera.ray::<L>(x, y, time);
             if tracer.tables.textures.has_levels() {
                 let (width, spread) = tracer.camera.cone::<L>(direction);
                 width.store(&mut pool.cone_width, at);

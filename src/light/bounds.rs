@@ -102,6 +102,16 @@ impl Bounds {
         Self { low: self.low - radius, high: self.high + radius, ball: radius, ..self }
     }
 
+    /// What is somewhere within `radius` metres of its box.
+    pub fn widened(self, radius: f64) -> Self {
+        Self { low: self.low - radius, high: self.high + radius, ..self }
+    }
+
+    /// The same with a part of the strength.
+    pub fn part(self, part: f64) -> Self {
+        Self { strength: self.strength * part, ..self }
+    }
+
     /// Both.
     pub fn union(&self, other: &Self) -> Self {
         let (axis, cos_cone) = join_cones((self.axis, self.cos_cone), (other.axis, other.cos_cone));

@@ -7,7 +7,8 @@ use super::quad::Quad;
 use super::rect::Span;
 use super::table::Sources;
 use crate::math::{UvSets, V3, robust};
-use crate::shape::table::NONE;
+use crate::shape::moving::segment;
+use crate::shape::table::{NONE, Triangle, TriangleTable};
 use simd::{Float, Lanes, Mask, Uint};
 
 /// Records of an element.
@@ -16,9 +17,9 @@ use simd::{Float, Lanes, Mask, Uint};
 /// |---|---|---|
 /// | 0 | corner, position or direction towards the light | kind |
 /// | 1 | edge 1, or the spot's axis | attributes; of a parallelogram those of its first half |
-/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | attributes of a parallelogram's second half |
+/// | 2 | edge 2, or the spot's scale and outer cosine and its size: the squared radius (of bulbs too), or 1 - cos of the sun's | attributes of a parallelogram's second half; of a triangle that moves one more than its number, else 0 |
 /// | 3 | intensity or illuminance; which corners of its halves the parallelogram's edges leave, 2 bits each; one over their lengths in a rectangle, else 0 | material |
-/// | 4 | unit normal | offset length |
+/// | 4 | unit normal; of a punctual light that moves where its keys are and one less than it has of them | offset length |
 pub const RECORDS: u32 = 5;
 const TRIANGLE: u32 = 0;
 const POINT: u32 = 1;
@@ -71,6 +72,8 @@ pub struct LightSample<L: Lanes> {
 pub struct Element<L: Lanes> {
     pub(super) records: [[L::F; 4]; 4],
     normal: L::U,
+    /// Unit normals of triangles, where some may have turned.
+    turned: Option<V3<L>>,
     /// Selection pmf.
     pub pmf: L::F,
     /// Density of a point on it, given that the light is chosen, 1/m^2.
@@ -81,14 +84,18 @@ fn record(v: glam::Vec3, w: u32) -> [f32; 4] {
     [v.x, v.y, v.z, f32::from_bits(w)]
 }
 
-/// A triangle of a surface of `material`.
-pub fn triangle(lamp: &LampTriangle, material: u32) -> [[f32; 4]; RECORDS as usize] {
-    let LampTriangle { corners, ng, attributes, .. } = *lamp;
-    let offset = offset_length(&corners, ng);
+/// A triangle of a surface of `material`, with its corners at all keys if it moves.
+pub fn triangle(lamp: &LampTriangle, keys: &[[glam::Vec3; 3]], material: u32) -> [[f32; 4]; RECORDS as usize] {
+    let LampTriangle { corners, ng, attributes, primitive, .. } = *lamp;
+    let mut offset = offset_length(&corners, ng);
+    if !keys.is_empty() {
+        // Whichever way it faces.
+        offset = offset_length(keys.as_flattened(), glam::Vec3::splat(3f32.sqrt().recip()));
+    }
     [
         record(corners[0], TRIANGLE),
         record(corners[1] - corners[0], attributes),
-        record(corners[2] - corners[0], 0),
+        record(corners[2] - corners[0], if keys.is_empty() { 0 } else { primitive + 1 }),
         record(glam::Vec3::ZERO, material),
         record(ng, offset.to_bits()),
     ]
@@ -148,6 +155,11 @@ pub fn directional(towards: glam::Vec3, illuminance: [f32; 3], angular_radius: f
     [record(towards, DIRECTIONAL), axis, size, record(illuminance.into(), 0), [0.0; 4]]
 }
 
+/// Tells a punctual light where its keys are, the first and the `later` ones.
+pub fn set_keys(records: &mut [[f32; 4]; RECORDS as usize], first: u32, later: u32) {
+    records[4] = [f32::from_bits(first), f32::from_bits(later), 0.0, 0.0];
+}
+
 /// Stands for the environment.
 pub fn environment() -> [[f32; 4]; RECORDS as usize] {
     let mut records = [[0.0; 4]; RECORDS as usize];
@@ -166,13 +178,69 @@ impl<L: Lanes> Element<L> {
             (at + L::U::splat(2)).records(elements),
             (at + L::U::splat(3)).records(elements),
         ];
-        Self { records, normal: at + L::U::splat(4), pmf, density }
+        Self { records, normal: at + L::U::splat(4), turned: None, pmf, density }
     }
 
     /// The same element in every lane, certainly chosen; its records come first in `elements`.
     #[inline(always)]
     pub fn splat(elements: &[[f32; 4]]) -> Self {
         Self::load(elements, L::U::splat(0), L::F::one(), L::F::zero())
+    }
+
+    /// The same elements, triangles that move where they are at `time`.
+    #[inline(always)]
+    pub fn lamp_at(mut self, elements: &[[f32; 4]], triangles: &TriangleTable, time: L::F) -> Self {
+        let one = L::U::splat(1);
+        let number = self.records[2][3].to_bits();
+        let moving = self.records[0][3].to_bits().eq(L::U::splat(TRIANGLE)) & !number.eq(L::U::splat(0));
+        let Some(moved) = triangles.moving.at::<L>((number - one).or_else(moving, one), time, moving) else {
+            return self;
+        };
+        let xyz = V3::<L>::of_record;
+        let [corner, e1, e2, _] = &self.records;
+        let none = L::U::splat(NONE);
+        let (material, attributes, tangents, light) = (none, none, none, none);
+        let ng = xyz(&self.normal.records(elements));
+        let (v0, e1, e2) = (xyz(corner), xyz(e1), xyz(e2));
+        let triangle = Triangle { v0, e1, e2, ng, material, attributes, tangents, light };
+        let (triangle, growth) = triangles.moving.moved(&triangle, &moved);
+        for (record, v) in self.records.iter_mut().zip([triangle.v0, triangle.e1, triangle.e2]) {
+            (record[0], record[1], record[2]) = (v.x, v.y, v.z);
+        }
+        self.turned = Some(triangle.ng);
+        self.density = self.density / growth;
+        self
+    }
+
+    /// The same elements, punctual lights that move where they are at `time`; `keys` are those of [`set_keys`].
+    #[inline(always)]
+    pub fn punctual_at(mut self, elements: &[[f32; 4]], keys: &[[f32; 4]], time: L::F) -> Self {
+        if keys.is_empty() {
+            return self;
+        }
+        let kind = self.records[0][3].to_bits();
+        let is_punctual = kind.eq(L::U::splat(POINT)) | kind.eq(L::U::splat(SPOT)) | kind.eq(L::U::splat(DIRECTIONAL));
+        let place = self.normal.records(elements);
+        let last = place[1].to_bits();
+        let moving = is_punctual & !last.eq(L::U::splat(0));
+        if !moving.any() {
+            return self;
+        }
+        let two = L::U::splat(2);
+        let (k, s) = segment::<L>(last.or_else(moving, L::U::splat(1)), time);
+        let at = (place[0].to_bits() + k * two).or_else(moving, L::U::splat(0));
+        let is_distant = kind.eq(L::U::splat(DIRECTIONAL));
+        for (i, record) in self.records.iter_mut().take(2).enumerate() {
+            let at = at + L::U::splat(i as u32);
+            let (before, after) = (at.records(keys), (at + two).records(keys));
+            let v = V3::<L>::of_record(&before).lerp(V3::of_record(&after), s);
+            // Directions stay unit: those of suns come first, axes second.
+            let unit = v.normalized();
+            let is_direction = if i == 0 { is_distant } else { !is_distant };
+            let v = unit.or_else(is_direction & unit.is_finite(), v).or_else(moving, V3::of_record(record));
+            (record[0], record[1], record[2]) = (v.x, v.y, v.z);
+        }
+        self
     }
 
     /// Lanes whose element is the environment.
@@ -224,7 +292,10 @@ impl<L: Lanes> Element<L> {
         let Sources { triangles, materials, textures } = *sources;
         let normal = self.normal.records(elements);
         let xyz = V3::<L>::of_record;
-        let ng = xyz(&normal);
+        let ng = match self.turned {
+            Some(ng) => ng,
+            None => xyz(&normal),
+        };
         // Uniform on the triangle: Heitz 2019, "A Low-Distortion Map Between Triangle and Square".
         let half = L::F::splat(0.5);
         let upper = u[1].gt(u[0]);

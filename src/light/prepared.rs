@@ -31,6 +31,8 @@ pub enum PreparedLight {
         cone: Option<(glam::Vec3, f32, f32)>,
         /// Of the ball that it is, metres; 0: none.
         radius: f64,
+        /// Position and axis at later times of the shutter, evenly spaced; empty at rest.
+        later: Vec<(glam::Vec3, glam::Vec3)>,
     },
     /// Parallel light.
     Directional {
@@ -40,6 +42,8 @@ pub enum PreparedLight {
         illuminance: [f32; 3],
         /// Half the angle that it is seen at, radians, at most pi/2; 0: none.
         angular_radius: f64,
+        /// Direction towards it at later times of the shutter, evenly spaced; empty at rest.
+        later: Vec<glam::Vec3>,
     },
 }
 
@@ -64,6 +68,15 @@ impl LampShape {
 }
 
 impl PreparedLight {
+    /// Whether it is a punctual light that moves. (Surfaces are known by their triangles.)
+    pub fn moves(&self) -> bool {
+        match self {
+            Self::Mesh { .. } => false,
+            Self::Point { later, .. } => !later.is_empty(),
+            Self::Directional { later, .. } => !later.is_empty(),
+        }
+    }
+
     /// Has a bulb sampled by points on its surface.
     pub fn forget_bulb(&mut self) {
         if let Self::Mesh { shape: shape @ LampShape::Bulb(_), .. } = self {

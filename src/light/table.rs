@@ -12,6 +12,7 @@ use super::prepared::{LampShape, PreparedLight};
 use super::sized::Met;
 use crate::material::table::MaterialTable;
 use crate::math::{V3, distribution};
+use crate::shape::moving::MovingTriangles;
 use crate::shape::table::TriangleTable;
 use crate::texture::lookup::TextureTable;
 use glam::DVec3;
@@ -59,6 +60,10 @@ pub struct LightTable {
     suns: Range<u32>,
     environment: Option<EnvironmentTable>,
     samples_environment: bool,
+    /// Punctual lights that move, at every key: two records, as the first two of an element.
+    keys: Vec<[f32; 4]>,
+    /// Some light moves.
+    moves: bool,
     /// How one is chosen; `None` for a single light.
     choice: Option<Choice>,
 }
@@ -71,11 +76,12 @@ impl LightTable {
         radius: f64,
         triangles: &mut TriangleTable,
     ) -> Self {
-        // Stable: surfaces, balls, points, suns.
+        // Stable: surfaces, balls, points that move, other points, suns.
         lights.sort_by_key(|light| match light {
             PreparedLight::Mesh { .. } => 0,
-            PreparedLight::Point { radius, .. } => 1 + u8::from(*radius <= 0.0),
-            PreparedLight::Directional { .. } => 3,
+            PreparedLight::Point { radius, .. } if *radius > 0.0 => 1,
+            PreparedLight::Point { .. } => 3 - u8::from(light.moves()),
+            PreparedLight::Directional { .. } => 4,
         });
         let mut table = Self::default();
         // An environment that is the same all around is left to scattered rays, which find it wherever they go.
@@ -84,7 +90,7 @@ impl LightTable {
         let count = lights.len() + usize::from(sky.is_some());
         let mut order: Vec<u32> = (0..lights.len() as u32).collect();
         if count > 1 {
-            let (choice, placed) = Choice::new(candidates(&lights, sky, radius));
+            let (choice, placed) = Choice::new(candidates(&lights, sky, radius, &triangles.moving));
             order[..placed.len()].copy_from_slice(&placed);
             table.choice = Some(choice);
         }
@@ -108,31 +114,46 @@ impl LightTable {
                 for lamp in lamps {
                     triangles.set_light(lamp.primitive as usize, number);
                 }
-                self.push_lamp(lamps, *material, shape);
+                self.push_lamp(lamps, *material, shape, &triangles.moving);
                 self.emissive_meshes += 1;
                 self.emissive_triangles += lamps.len();
             }
-            &PreparedLight::Point { position, intensity, cone, radius } => {
+            &PreparedLight::Point { position, intensity, cone, radius, ref later } => {
                 if radius > 0.0 {
                     extend(&mut self.balls, self.lights.len() as u32);
                     self.has_sized = true;
                 }
-                self.push_element(0, 0, 0.0, element::point(position, intensity, cone, radius));
-                self.has_punctual = true;
+                self.push_punctual(element::point(position, intensity, cone, radius), later);
             }
-            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
+            &PreparedLight::Directional { towards, illuminance, angular_radius, ref later } => {
                 if angular_radius > 0.0 {
                     extend(&mut self.suns, self.lights.len() as u32);
                     self.has_sized = true;
                 }
-                self.push_element(0, 0, 0.0, element::directional(towards, illuminance, angular_radius));
-                self.has_punctual = true;
+                let later: Vec<_> = later.iter().map(|&towards| (towards, glam::Vec3::ZERO)).collect();
+                self.push_punctual(element::directional(towards, illuminance, angular_radius), &later);
             }
         }
     }
 
+    /// A light of the one element `records`, whose first two records have these vectors at later times.
+    fn push_punctual(
+        &mut self,
+        mut records: [[f32; 4]; element::RECORDS as usize],
+        later: &[(glam::Vec3, glam::Vec3)],
+    ) {
+        if !later.is_empty() {
+            element::set_keys(&mut records, self.keys.len() as u32, later.len() as u32);
+            self.keys.extend([records[0], records[1]]);
+            self.keys.extend(later.iter().flat_map(|(a, b)| [[a.x, a.y, a.z, 0.0], [b.x, b.y, b.z, 0.0]]));
+            self.moves = true;
+        }
+        self.push_element(0, 0, 0.0, records);
+        self.has_punctual = true;
+    }
+
     /// A glowing mesh.
-    fn push_lamp(&mut self, lamps: &[LampTriangle], material: u32, shape: &LampShape) {
+    fn push_lamp(&mut self, lamps: &[LampTriangle], material: u32, shape: &LampShape, moving: &MovingTriangles) {
         let areas: Vec<f64> = lamps.iter().map(|lamp| lamp.area).collect();
         let density = 1.0 / areas.iter().sum::<f64>();
         match shape {
@@ -150,8 +171,13 @@ impl LightTable {
                 distribution::push_ends(&areas, &mut self.ends);
                 let ends = self.ends.len() - first_end;
                 self.most_ends = self.most_ends.max(ends as u32);
-                self.push_element(first_end as u32, ends as u32, density, element::triangle(&lamps[0], material));
-                self.elements.extend(lamps[1..].iter().flat_map(|lamp| element::triangle(lamp, material)));
+                let element = |lamp: &LampTriangle| {
+                    let keys: Vec<_> = moving.corners(lamp.primitive).collect();
+                    element::triangle(lamp, &keys, material)
+                };
+                self.moves |= lamps.iter().any(|lamp| moving.corners(lamp.primitive).next().is_some());
+                self.push_element(first_end as u32, ends as u32, density, element(&lamps[0]));
+                self.elements.extend(lamps[1..].iter().flat_map(element));
             }
         }
         self.has_lamps = true;
@@ -195,6 +221,11 @@ impl LightTable {
         self.emissive_triangles > 0
     }
 
+    /// Some light moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.moves
+    }
+
     /// There is light from all around.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()
@@ -210,11 +241,17 @@ impl LightTable {
         self.suns.clone()
     }
 
-    /// What rays from `p` along the unit vectors `d` meet of the light `number` of [`Self::balls`], and the density with
+    /// What rays at `time` from `p` along the unit vectors `d` meet of the light `number` of [`Self::balls`], and the density with
     /// which it is sampled from `from` (receivers and sums; `None` in scenes without a choice), 1/sr.
     #[inline(always)]
-    pub fn ball<L: Lanes>(&self, number: u32, p: V3<L>, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
-        let met = Element::splat(self.records(number)).meet_ball(p, d);
+    pub fn ball<L: Lanes>(
+        &self,
+        number: u32,
+        (p, d): (V3<L>, V3<L>),
+        time: L::F,
+        from: Option<&(Receiver<L>, L::F)>,
+    ) -> Met<L> {
+        let met = self.only::<L>(number, time).meet_ball(p, d);
         if !met.meets.any() {
             return met;
         }
@@ -227,8 +264,8 @@ impl LightTable {
 
     /// [`Self::ball`] of the light `number` of [`Self::suns`].
     #[inline(always)]
-    pub fn sun<L: Lanes>(&self, number: u32, d: V3<L>, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
-        let met = Element::splat(self.records(number)).meet_sun(d);
+    pub fn sun<L: Lanes>(&self, number: u32, d: V3<L>, time: L::F, from: Option<&(Receiver<L>, L::F)>) -> Met<L> {
+        let met = self.only::<L>(number, time).meet_sun(d);
         if !met.meets.any() {
             return met;
         }
@@ -237,6 +274,13 @@ impl LightTable {
             _ => L::F::one(),
         };
         Met { pdf: met.pdf * pmf, ..met }
+    }
+
+    /// The punctual light `number` in every lane.
+    #[inline(always)]
+    fn only<L: Lanes>(&self, number: u32, time: L::F) -> Element<L> {
+        let element = Element::splat(self.records(number));
+        if self.keys.is_empty() { element } else { element.punctual_at(self.records(number), &self.keys, time) }
     }
 
     /// Records of the elements of a light, and those after them.
@@ -316,13 +360,14 @@ impl LightTable {
         environment.lookup::<L>(d)
     }
 
-    /// A light and a point on it, as seen from `at`, by `u` = (choice, point, point, triangle). The table must not be
-    /// empty.
+    /// A light and a point on it at `time`, as seen from `at`, by `u` = (choice, point, point, triangle). The table must not
+    /// be empty.
     #[inline(always)]
     pub fn sample<L: Lanes>(
         &self,
         at: &Receiver<L>,
         u: [L::F; 4],
+        time: L::F,
         sources: Sources<'_>,
         scratch: &mut [f32],
     ) -> LightSample<L> {
@@ -333,7 +378,7 @@ impl LightTable {
             }
             None => (L::U::splat(0), L::F::one(), L::F::zero()),
         };
-        let sample = L::outline(Sample { lights: self, light, pmf, p: at.p, u, sources });
+        let sample = L::outline(Sample { lights: self, light, pmf, p: at.p, u, time, sources });
         LightSample { total, ..sample }
     }
 }
@@ -344,30 +389,44 @@ fn extend(numbers: &mut Range<u32>, number: u32) {
 }
 
 /// How `lights` look from afar.
-fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candidates {
+fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64, moving: &MovingTriangles) -> Candidates {
     let mean = |c: [f32; 3]| c.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
     let mut candidates = Candidates { placed: Vec::new(), surfaces: 0, balls: 0, suns: Vec::new(), sky, radius };
     for light in lights {
         match light {
             PreparedLight::Mesh { triangles, radiance, both_sides, .. } => {
-                let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.corners.map(|c| c.as_dvec3())).collect();
-                candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides));
+                let mut corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.corners.map(|c| c.as_dvec3())).collect();
+                let later = triangles.iter().flat_map(|t| moving.corners(t.primitive).skip(1));
+                corners.extend(later.map(|corners| corners.map(|c| c.as_dvec3())));
+                // What moves is there once at every key, for a part of the time.
+                let part = triangles.len() as f64 / corners.len() as f64;
+                candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides).part(part));
                 candidates.surfaces += 1;
             }
-            &PreparedLight::Point { position, intensity, cone, radius } => {
-                let (position, intensity) = (position.as_dvec3(), mean(intensity));
-                let small = match cone {
-                    Some((axis, inner, outer)) => {
-                        let (inner, outer) = (f64::from(inner), f64::from(outer));
-                        Bounds::of_spot(position, intensity, axis.as_dvec3(), inner, outer)
+            PreparedLight::Point { position, intensity, cone, radius, later } => {
+                let intensity = mean(*intensity);
+                candidates.placed.push(match cone {
+                    // It shines everywhere around where it may be: towards which side of that is not asked.
+                    _ if !later.is_empty() => {
+                        let share = intensity / (1 + later.len()) as f64;
+                        let at = |place: &glam::Vec3| Bounds::of_point(place.as_dvec3(), share);
+                        later.iter().fold(at(position), |all, (place, _)| all.union(&at(place))).widened(*radius)
                     }
-                    None => Bounds::of_point(position, intensity),
-                };
-                candidates.placed.push(small.with_radius(radius));
-                candidates.balls += usize::from(radius > 0.0);
+                    Some((axis, inner, outer)) => {
+                        let (inner, outer) = (f64::from(*inner), f64::from(*outer));
+                        let spot = Bounds::of_spot(position.as_dvec3(), intensity, axis.as_dvec3(), inner, outer);
+                        spot.with_radius(*radius)
+                    }
+                    None => Bounds::of_point(position.as_dvec3(), intensity).with_radius(*radius),
+                });
+                candidates.balls += usize::from(*radius > 0.0 || !later.is_empty());
             }
-            &PreparedLight::Directional { towards, illuminance, angular_radius } => {
-                let (towards, illuminance) = (towards.as_dvec3(), mean(illuminance));
+            PreparedLight::Directional { towards, illuminance, angular_radius, later } => {
+                let (towards, illuminance) = (towards.as_dvec3(), mean(*illuminance));
+                // Wherever it goes it is in the cone about where it starts.
+                let from = |other: &glam::Vec3| towards.angle_between(other.as_dvec3());
+                let turned = later.iter().map(from).fold(0.0, f64::max);
+                let angular_radius = (angular_radius + turned).min(std::f64::consts::FRAC_PI_2);
                 candidates.suns.push(Sun { towards, illuminance, angular_radius });
             }
         }
@@ -382,6 +441,7 @@ struct Sample<'a, L: Lanes> {
     pmf: L::F,
     p: V3<L>,
     u: [L::F; 4],
+    time: L::F,
     sources: Sources<'a>,
 }
 
@@ -390,14 +450,18 @@ impl<L: Lanes> Part<L> for Sample<'_, L> {
 
     #[inline(always)]
     fn run(self) -> LightSample<L> {
-        let Self { lights, light, pmf, p, u, sources } = self;
+        let Self { lights, light, pmf, p, u, time, sources } = self;
         let record = light.records(&lights.lights);
         let mut index = record[0].to_bits();
         if lights.most_ends > 1 {
             let (first, count) = (record[1].to_bits(), record[2].to_bits());
             index = index + distribution::find_each::<L>(&lights.ends, first, count, lights.most_ends, u[3]);
         }
-        let element = Element::<L>::load(&lights.elements, index, pmf, record[3]);
+        let mut element = Element::<L>::load(&lights.elements, index, pmf, record[3]);
+        if lights.moves {
+            element = element.lamp_at(&lights.elements, sources.triangles, time);
+            element = element.punctual_at(&lights.elements, &lights.keys, time);
+        }
         let Some(environment) = lights.environment.as_ref().filter(|_| lights.samples_environment) else {
             return lights.sample_near(&element, light, p, [u[1], u[2]], &sources);
         };

@@ -1,5 +1,6 @@
 //! Where things are: the boxes of meshes and of their instances, and which instances a mesh has.
 
+use super::moving;
 use crate::scene::{Instance, MAX_COORDINATE, MeshId, Scene};
 use crate::shape::Mesh;
 use glam::{DMat4, DVec3, Vec3};
@@ -41,7 +42,7 @@ impl Boxes {
             *at += 1;
         }
         let mut boxes = Self { of_meshes, first, instances, scene: None };
-        boxes.scene = scene.instances.iter().filter_map(|i| boxes.of_instance(scene, i)).reduce(join);
+        boxes.scene = (0..scene.instances.len()).filter_map(|i| boxes.of_instance(scene, i)).reduce(join);
         boxes
     }
 
@@ -60,8 +61,25 @@ impl Boxes {
         self.scene.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high))
     }
 
-    /// World box of an instance.
-    fn of_instance(&self, scene: &Scene, instance: &Instance) -> Bounds {
+    /// World box of instance `i`, at all times of the shutter.
+    fn of_instance(&self, scene: &Scene, i: usize) -> Bounds {
+        let instance = &scene.instances[i];
+        let first = self.of_map(scene, instance);
+        if !moving::moves(scene, i) {
+            return first;
+        }
+        // Vertices move linearly in between.
+        let mesh = &scene.meshes[instance.mesh.index()];
+        let later = moving::later(scene, i, moving::most_keys(scene, &[i as u32]));
+        let later = later.iter().filter_map(|later| {
+            let positions = later.pose.map_or(&mesh.positions, |pose| &pose.positions);
+            exact(mesh, positions, &later.world_from_object)
+        });
+        first.into_iter().chain(later).reduce(join)
+    }
+
+    /// World box of an instance when the shutter opens.
+    fn of_map(&self, scene: &Scene, instance: &Instance) -> Bounds {
         let mesh = &scene.meshes[instance.mesh.index()];
         let world_from_object = &instance.world_from_object;
         if mesh.indices.len().saturating_mul(self.instances_of(instance.mesh).len()) > MOST_EXACT {
@@ -70,7 +88,7 @@ impl Boxes {
                 return Some(placed);
             }
         }
-        exact(mesh, world_from_object)
+        exact(mesh, &mesh.positions, world_from_object)
     }
 }
 
@@ -101,8 +119,8 @@ fn box_of_mesh(mesh: &Mesh) -> Bounds {
 
 /// Only vertices that a triangle uses, and only triangles that are kept: one that flies off to 1e30 m would leave the
 /// others no digits.
-fn exact(mesh: &Mesh, world_from_object: &DMat4) -> Bounds {
-    let place = |i: u32| world_from_object.transform_point3(Vec3::from(mesh.positions[i as usize]).as_dvec3());
+fn exact(mesh: &Mesh, positions: &[[f32; 3]], world_from_object: &DMat4) -> Bounds {
+    let place = |i: u32| world_from_object.transform_point3(Vec3::from(positions[i as usize]).as_dvec3());
     let corners = mesh.indices.iter().map(|triangle| triangle.map(place));
     let kept = corners.filter(|corners| corners.iter().all(is_usable));
     kept.flatten().map(|p| (p, p)).reduce(join)

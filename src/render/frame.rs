@@ -85,9 +85,10 @@ pub fn render_prepared(
 ) -> Result<Frame, RenderError> {
     let (width, height) = (settings.width, settings.height);
     assert!(width > 0 && height > 0 && settings.spp > 0, "sizes and samples are positive");
+    let later = tracer::later(scene, camera);
     let camera = tracer::camera(scene, camera, &prepared, settings);
     let window = tracer::window(settings);
-    let tracer = tracer::tracer(&prepared, &camera, settings);
+    let tracer = tracer::tracer(&prepared, &camera, later, settings);
     let window_tile = Tile { x: window.x, y: window.y, width: window.width, height: window.height };
     progress.enter(Phase::Rendering);
     let start = Instant::now();

@@ -3,6 +3,7 @@
 //! The constants are the sizes of the types they stand for, or measured where they are another library's;
 //! `examples/memory.rs` holds the sum against what a process took at most.
 
+use super::moving::most_keys;
 use super::placing::Placing;
 use super::tracer::window;
 use super::{AccelChoice, DefaultLight, RenderSettings};
@@ -195,6 +196,10 @@ const CHOICE: u64 = 2 * 32 + 16;
 const ENVIRONMENT_TEXEL: u64 = 16 + 4;
 /// A texel of the map that it was made from, which stays.
 const MAP_TEXEL: u64 = 12;
+/// A triangle whose vertices move, a key: what shading reads of it, and its share of a segment's tree.
+const MOVING_TRIANGLE: u64 = 9 * 16 + 128;
+/// A key of a map that moves: for shading and for rays.
+const MOVING_KEY: u64 = 2 * 48;
 
 impl Machinery {
     fn of(scene: &Scene, settings: &RenderSettings) -> Self {
@@ -203,9 +208,8 @@ impl Machinery {
         let (mut vertices, mut triangles, mut lights, mut records, mut largest) = (0_u64, 0_u64, 0_u64, 0_u64, 0_u64);
         let mut choices = 0_u64;
         let placing = Placing::of_scene(scene);
-        let merged = scene.instances.iter().zip(&placing.is_merged).filter(|(_, is_merged)| **is_merged);
         let placed = placing.things.iter().flat_map(|thing| &thing.meshes);
-        for mesh in merged.map(|(instance, _)| &instance.mesh).chain(placed) {
+        for mesh in placing.held(scene).map(|instance| &instance.mesh).chain(placed) {
             let mesh = &scene.meshes[mesh.index()];
             let n = mesh.indices.len() as u64;
             vertices += mesh.positions.len() as u64;
@@ -243,6 +247,7 @@ impl Machinery {
                 + lights * LIGHT
                 + choices * CHOICE
                 + placements * PLACEMENT
+                + moving(scene, &placing)
                 + accel.held,
             building: geometry
                 + levels.building
@@ -252,6 +257,18 @@ impl Machinery {
                 + accel.building,
         }
     }
+}
+
+/// What is held of things that move, beyond what they took at rest, bytes.
+fn moving(scene: &Scene, placing: &Placing) -> u64 {
+    let keys = most_keys(scene, &placing.deformed) as u64;
+    let deformed = placing.deformed.iter().map(|&i| {
+        let mesh = &scene.meshes[scene.instances[i as usize].mesh.index()];
+        let (vertices, triangles) = (mesh.positions.len() as u64, mesh.indices.len() as u64);
+        keys * (12 * vertices + MOVING_TRIANGLE * triangles)
+    });
+    let maps = scene.motion.instances.values().map(|later| (1 + later.len() as u64) * MOVING_KEY);
+    deformed.chain(maps).sum()
 }
 
 /// What levels of detail take, bytes.

@@ -49,7 +49,7 @@ impl SampleSink for Nowhere {
 /// Traces paths of the picture of `camera` for about a tenth of a second on the threads of the current rayon pool.
 /// Nothing is kept of them.
 pub fn pilot(prepared: &Prepared, camera: &Camera, settings: &RenderSettings) -> Pilot {
-    let (tracer, window) = (tracer(prepared, camera, settings), window(settings));
+    let (tracer, window) = (tracer(prepared, camera, &[], settings), window(settings));
     let samples = settings.spp.div_ceil(BLOCKS).min(SAMPLES);
     let side = if samples < FEW_SAMPLES { TILE } else { PATCH };
     let next = AtomicU32::new(0);

@@ -5,9 +5,10 @@
 //! every run, backend and number of samples makes the same; docs/decisions/0008-two-level.md has the measurements.
 
 use super::boxes::{Boxes, area, join, placed};
+use super::moving;
 use crate::accel::geometry::Affine;
 use crate::math::robust::gamma;
-use crate::scene::{MeshId, Scene};
+use crate::scene::{Instance, MeshId, Scene};
 use crate::shape::placement::PlacementError;
 use glam::{DMat3, DMat4, DVec3};
 use serde::Serialize;
@@ -70,6 +71,8 @@ pub struct Placing {
     pub things: Vec<Thing>,
     /// Whether an instance of the scene is merged, by its index.
     pub is_merged: Vec<bool>,
+    /// Instances that are neither: their vertices are known at several times of the shutter. Ascending.
+    pub deformed: Vec<u32>,
     /// What was considered: all that has several instances.
     pub considered: Vec<Considered>,
 }
@@ -100,7 +103,7 @@ impl Placing {
     pub fn of_scene(scene: &Scene) -> Self {
         let mut is_used = vec![false; scene.meshes.len()];
         let mut repeats = |mesh: usize| std::mem::replace(&mut is_used[mesh], true);
-        if !scene.instances.iter().any(|instance| repeats(instance.mesh.index())) {
+        if scene.motion.is_empty() && !scene.instances.iter().any(|instance| repeats(instance.mesh.index())) {
             return Self { is_merged: vec![true; scene.instances.len()], ..Self::default() };
         }
         Self::of(scene, &Boxes::of(scene), Choice::Auto)
@@ -109,10 +112,11 @@ impl Placing {
     /// Decides for `scene`.
     pub fn of(scene: &Scene, boxes: &Boxes, choice: Choice) -> Self {
         let mut placing = Self { is_merged: vec![true; scene.instances.len()], ..Self::default() };
+        let moves = move_apart(scene, boxes, &mut placing);
         if choice == Choice::Never {
             return placing;
         }
-        let mut candidates = candidates(scene, boxes, if choice == Choice::Always { 1 } else { 2 });
+        let mut candidates = candidates(scene, boxes, if choice == Choice::Always { 1 } else { 2 }, &moves);
         decide(&mut candidates, scene.triangle_count() as u64, choice);
         for candidate in candidates {
             if candidate.instances > 1 {
@@ -132,6 +136,13 @@ impl Placing {
         placing
     }
 
+    /// Instances that are held on their own: merged or deformed.
+    pub fn held<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = &'a Instance> + 'a {
+        let merged =
+            scene.instances.iter().zip(&self.is_merged).filter_map(|(instance, merged)| merged.then_some(instance));
+        merged.chain(self.deformed.iter().map(|&i| &scene.instances[i as usize]))
+    }
+
     /// Placed things, each as often as it is placed.
     pub fn placements(&self) -> usize {
         self.things.iter().map(|thing| thing.instances.len()).sum()
@@ -139,10 +150,83 @@ impl Placing {
 }
 
 impl Thing {
-    /// The maps to the prepared space, whose origin is at `origin` in world space, from the object's.
+    /// The maps to the prepared space, whose origin is at `origin` in world space, from the object's, when the shutter
+    /// opens.
     pub fn places<'a>(&'a self, scene: &'a Scene, origin: DVec3) -> impl Iterator<Item = DMat4> + 'a {
         self.instances.iter().map(move |&i| place(&scene.instances[i as usize].world_from_object, self.centre, origin))
     }
+
+    /// [`Self::places`] at every key: one for what stands still.
+    pub fn keys<'a>(&'a self, scene: &'a Scene, origin: DVec3) -> impl Iterator<Item = Vec<DMat4>> + 'a {
+        self.instances.iter().map(move |&i| keys(scene, i as usize, self.centre, origin))
+    }
+}
+
+/// The maps of instance `i` at all of its keys, see [`place`].
+fn keys(scene: &Scene, i: usize, centre: DVec3, origin: DVec3) -> Vec<DMat4> {
+    let keys = moving::keys_of_instance(scene, i);
+    if keys == 1 {
+        return vec![place(&scene.instances[i].world_from_object, centre, origin)];
+    }
+    (0..keys).map(|k| place(&moving::map_at(scene, i, k, keys), centre, origin)).collect()
+}
+
+/// Whether a mesh shines.
+fn emits(scene: &Scene, mesh: MeshId) -> bool {
+    let material = &scene.materials[scene.meshes[mesh.index()].material.index()];
+    !material.unlit && material.emission.factor.iter().any(|&e| e > 0.0)
+}
+
+/// Decides about the instances that move, and says which they are. What keeps its form is placed at every key, so that only
+/// its map moves; its vertices do where that would cost precision, and where it shines, since points on lights are chosen in
+/// the world.
+fn move_apart(scene: &Scene, boxes: &Boxes, placing: &mut Placing) -> Vec<bool> {
+    let mut moves = vec![false; scene.instances.len()];
+    if scene.motion.is_empty() {
+        return moves;
+    }
+    let mut things: Vec<(Vec<DMat4>, Thing)> = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate().filter(|&(i, _)| moving::moves(scene, i)) {
+        (moves[i], placing.is_merged[i]) = (true, false);
+        let deforms = moving::keys_of_mesh(scene, instance.mesh.index()) > 1;
+        if deforms || emits(scene, instance.mesh) || !can_move(scene, boxes, i) {
+            placing.deformed.push(i as u32);
+            continue;
+        }
+        // The meshes of a node have the same maps, and come one after the other.
+        let maps = keys(scene, i, DVec3::ZERO, DVec3::ZERO);
+        match things.last_mut().filter(|(last, _)| *last == maps) {
+            Some((_, thing)) => thing.meshes.push(instance.mesh),
+            None => {
+                let (meshes, instances) = (vec![instance.mesh], vec![i as u32]);
+                things.push((maps, Thing { meshes, centre: DVec3::ZERO, instances }));
+            }
+        }
+    }
+    let mut known: HashMap<Vec<u32>, usize> = HashMap::new();
+    for (_, thing) in things {
+        let meshes = thing.meshes.iter().map(|mesh| mesh.0).collect();
+        if let Some(&at) = known.get(&meshes) {
+            placing.things[at].instances.extend(thing.instances);
+            continue;
+        }
+        known.insert(meshes, placing.things.len());
+        let bounds = thing.meshes.iter().filter_map(|&mesh| boxes.of_mesh(mesh)).reduce(join);
+        let centre = bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+        placing.things.push(Thing { centre, ..thing });
+    }
+    moves
+}
+
+/// Whether instance `i` can be placed at every key, and in between: it is not turned inside out.
+fn can_move(scene: &Scene, boxes: &Boxes, i: usize) -> bool {
+    let (Some((low, high)), Some(whole)) = (boxes.of_mesh(scene.instances[i].mesh), boxes.scene) else { return false };
+    let (half, radius) = (0.5 * (high - low), 0.5 * (whole.1 - whole.0).max_element());
+    let maps = keys(scene, i, 0.5 * (low + high), boxes.origin());
+    let determinant = |map: &DMat4| DMat3::from_mat4(*map).determinant();
+    let side = determinant(&maps[0]).signum();
+    let between = maps.windows(2).map(|pair| (pair[0] + pair[1]) * 0.5);
+    maps.iter().copied().chain(between).all(|map| can_be_placed(&map, half, radius) && determinant(&map) * side > 0.0)
 }
 
 /// To the prepared space, from that of an object about `centre`.
@@ -204,18 +288,18 @@ impl Candidate {
     }
 }
 
-/// Meshes of at least `least` instances, those with the same places together.
-fn candidates(scene: &Scene, boxes: &Boxes, least: usize) -> Vec<Candidate> {
+/// Meshes of at least `least` instances, those with the same places together; without those that have an instance that
+/// `moves`.
+fn candidates(scene: &Scene, boxes: &Boxes, least: usize, moves: &[bool]) -> Vec<Candidate> {
     let mut found: Vec<Candidate> = Vec::new();
     let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
     let transform = |i: &u32| &scene.instances[*i as usize].world_from_object;
     for (i, mesh) in scene.meshes.iter().enumerate() {
         let (id, all) = (MeshId(i as u32), boxes.instances_of(MeshId(i as u32)));
-        if all.len() < least.max(1) || mesh.indices.is_empty() {
+        if all.len() < least.max(1) || mesh.indices.is_empty() || all.iter().any(|&i| moves[i as usize]) {
             continue;
         }
-        let material = &scene.materials[mesh.material.index()];
-        let emits = !material.unlit && material.emission.factor.iter().any(|&e| e > 0.0);
+        let emits = emits(scene, id);
         let mut hasher = DefaultHasher::new();
         emits.hash(&mut hasher);
         all.iter().for_each(|i| transform(i).to_cols_array().map(f64::to_bits).hash(&mut hasher));

@@ -1,30 +1,26 @@
 //! The seam: a scene's description becomes machinery. Everything conditional is decided here, once.
 
-use super::boxes::{Boxes, is_usable};
+use super::boxes::Boxes;
 use super::default_light::{DefaultLightReport, SurfaceTotals};
-use super::emission::mean_emissions;
-use super::opacity::Opacities;
+use super::flatten::{Flattener, Parts};
+use super::moving;
 use super::placing::{Choice, Considered, Placing, Thing, rounded};
 use super::{AccelChoice, AccelReport, RenderSettings, refraction};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
-use crate::accel::geometry::{Geometry, HitFilter, Object, Part, Placement};
+use crate::accel::geometry::{Affine, Geometry, HitFilter, Object, Placement};
 use crate::accel::{Accel, AccelStats, linear::Linear, wide::WideBvh};
 use crate::error::RenderError;
 use crate::integrator::{Coverage, SceneTables, Spectrum};
-use crate::light::element::LampTriangle;
 use crate::light::environment::EnvironmentTable;
-use crate::light::parts::connected;
-use crate::light::prepared::{LampShape, PreparedLight};
+use crate::light::prepared::PreparedLight;
 use crate::light::table::LightTable;
 use crate::light::{Light, studio};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
-use crate::math::MAX_UV_SETS;
 use crate::scene::Scene;
 use crate::shape::Mesh;
-use crate::shape::placement::{PlacementTable, cofactor, scaled};
-use crate::shape::table::{Corners, NONE, TriangleTable};
+use crate::shape::placement::{PlacementTable, cofactor};
 use crate::texture::lookup::TextureTable;
 use glam::{DMat3, DMat4, DVec3};
 use std::sync::Arc;
@@ -63,48 +59,6 @@ pub struct PlacedReport {
     pub stored: u64,
     /// What has several instances, and what became of it.
     pub considered: Vec<Considered>,
-}
-
-/// What is counted while instances are flattened.
-#[derive(Default)]
-struct Totals {
-    /// Triangles left out because flattening made them unusable.
-    without_area: usize,
-    surface: SurfaceTotals,
-    /// Their vertex normals all pointed to the back, and were turned round.
-    turned_normals: usize,
-    /// Triangles that are not finite or too far away for every backend.
-    too_far: usize,
-}
-
-/// Triangles of less area are not sampled as lights, m^2: the density of a point on them, 1 / area at most, would leave
-/// the range of f32. Paths still find what they emit.
-const LEAST_SAMPLED_AREA: f64 = f32::MIN_POSITIVE as f64;
-
-/// Triangles of the world or of an object: those that stop every ray, and those whose hits are to be asked about.
-struct Parts {
-    opaque: Part,
-    filtered: Part,
-}
-
-impl Default for Parts {
-    fn default() -> Self {
-        Self { opaque: Part::default(), filtered: Part { filtered: true, ..Part::default() } }
-    }
-}
-
-impl Parts {
-    /// Where triangles go that let some rays pass, or none.
-    fn of(&mut self, lets_rays_pass: bool) -> &mut Part {
-        if lets_rays_pass { &mut self.filtered } else { &mut self.opaque }
-    }
-
-    /// What backends are built from.
-    fn object(self) -> Object {
-        let mut parts = vec![self.opaque, self.filtered];
-        parts.retain(|part| !part.triangles.indices.is_empty());
-        Object { parts, shapes: Vec::new() }
-    }
 }
 
 /// Prepares `scene`.
@@ -172,32 +126,33 @@ fn prepare_all(
     if settings.texture_lod {
         textures.add_levels(&scene.textures, &scene.images)?;
     }
-    let mut triangles = TriangleTable::with_capacity(count as usize);
-    let mut parts = Parts::default();
+    let mut flattener = Flattener::new(scene, count as usize);
     let mut lights = Vec::new();
-    let (emissions, opacities) = (mean_emissions(scene), Opacities::new(scene));
-    let mut totals = Totals::default();
+    let mut parts = Parts::new(1);
     for instance in scene.instances.iter().zip(&placing.is_merged).filter_map(|(i, merged)| merged.then_some(i)) {
         let mesh = &scene.meshes[instance.mesh.index()];
-        let map = &instance.world_from_object;
-        let lights = Some(&mut lights);
-        flatten(scene, mesh, map, origin, &emissions, &opacities, &mut parts, &mut triangles, lights, &mut totals);
+        flattener.add(mesh, &instance.world_from_object, &[], origin, &mut parts, Some(&mut lights));
     }
-    let mut geometry = Geometry { world: parts.object(), ..Geometry::default() };
+    let moving = deformed(scene, &placing.deformed, origin, &mut flattener, &mut lights);
+    let mut geometry = Geometry { world: parts.object(moving), ..Geometry::default() };
     let mut placements = PlacementTable::with_capacity(placing.placements());
-    let mut seen = triangles.len() as u64;
+    let mut seen = flattener.table.len() as u64;
     for thing in &placing.things {
-        let before = triangles.len();
-        geometry.objects.push(object(scene, thing, &emissions, &opacities, &mut triangles, &mut totals));
-        seen += (triangles.len() - before) as u64 * thing.instances.len() as u64;
+        let before = flattener.table.len();
+        geometry.objects.push(object(scene, thing, &mut flattener));
+        seen += (flattener.table.len() - before) as u64 * thing.instances.len() as u64;
         let object = (geometry.objects.len() - 1) as u32;
-        for map in thing.places(scene, origin) {
-            let map = rounded(&map);
-            placements.push(map.columns, map.translation);
-            geometry.placements.push(Placement { object, keys: vec![map] });
+        for keys in thing.keys(scene, origin) {
+            let keys: Vec<Affine> = keys.iter().map(rounded).collect();
+            match keys[..] {
+                [map] => placements.push(map.columns, map.translation),
+                _ => placements.push_moving(&keys.iter().map(|map| (map.columns, map.translation)).collect::<Vec<_>>()),
+            }
+            geometry.placements.push(Placement { object, keys });
         }
-        add_surface(scene, thing, &emissions, &mut totals.surface);
+        add_surface(scene, thing, &flattener.emissions, &mut flattener.totals.surface);
     }
+    let Flattener { table: mut triangles, totals, .. } = flattener;
     let placed = PlacedReport {
         instances: placing.placements() as u64,
         triangles: seen,
@@ -244,30 +199,47 @@ fn prepare_all(
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, placed, warnings, losses })
 }
 
-/// Triangles that are held: those of merged instances, and of each placed mesh once.
+/// Flattens the instances `all`, whose vertices are known at every key; `None` without any.
+fn deformed(
+    scene: &Scene,
+    all: &[u32],
+    origin: DVec3,
+    flattener: &mut Flattener<'_>,
+    lights: &mut Vec<PreparedLight>,
+) -> Option<Parts> {
+    if all.is_empty() {
+        return None;
+    }
+    let keys = moving::most_keys(scene, all);
+    let meshes = || all.iter().map(|&i| &scene.meshes[scene.instances[i as usize].mesh.index()]);
+    let (has_normals, has_tangents) =
+        (meshes().any(|mesh| mesh.normals.is_some()), meshes().any(|mesh| mesh.tangents.is_some()));
+    flattener.begin_moving(keys, has_normals, has_tangents);
+    let mut parts = Parts::new(keys);
+    for (&i, mesh) in all.iter().zip(meshes()) {
+        let later = moving::later(scene, i as usize, keys);
+        let map = &scene.instances[i as usize].world_from_object;
+        flattener.add(mesh, map, &later, origin, &mut parts, Some(lights));
+    }
+    Some(parts)
+}
+
+/// Triangles that are held: those of instances that are not placed, and of each placed mesh once.
 pub(super) fn stored_triangles(scene: &Scene, placing: &Placing) -> u64 {
     let of = |mesh: &Mesh| mesh.indices.len() as u64;
-    let merged = scene.instances.iter().zip(&placing.is_merged).filter(|(_, merged)| **merged);
-    let merged: u64 = merged.map(|(instance, _)| of(&scene.meshes[instance.mesh.index()])).sum();
+    let merged: u64 = placing.held(scene).map(|instance| of(&scene.meshes[instance.mesh.index()])).sum();
     let placed = placing.things.iter().flat_map(|thing| &thing.meshes);
     merged + placed.map(|mesh| of(&scene.meshes[mesh.index()])).sum::<u64>()
 }
 
 /// What is placed, in a space of its own.
-fn object(
-    scene: &Scene,
-    thing: &Thing,
-    emissions: &[[f64; 3]],
-    opacities: &Opacities,
-    table: &mut TriangleTable,
-    totals: &mut Totals,
-) -> Object {
-    let mut parts = Parts::default();
+fn object(scene: &Scene, thing: &Thing, flattener: &mut Flattener<'_>) -> Object {
+    let mut parts = Parts::new(1);
     for mesh in &thing.meshes {
         let mesh = &scene.meshes[mesh.index()];
-        flatten(scene, mesh, &DMat4::IDENTITY, thing.centre, emissions, opacities, &mut parts, table, None, totals);
+        flattener.add(mesh, &DMat4::IDENTITY, &[], thing.centre, &mut parts, None);
     }
-    parts.object()
+    parts.object(None)
 }
 
 /// Adds the surface of a placed thing, at all its places, to `surface`.
@@ -304,129 +276,28 @@ fn environment(scene: &Scene, studio: bool) -> Option<EnvironmentTable> {
     own.or_else(|| studio.then(studio::environment).as_ref().and_then(EnvironmentTable::new))
 }
 
-/// Appends a mesh where `world_from_object` puts it, seen from `origin`; vertices are transformed in f64 and rounded
-/// once. Without `lights` it is an object's own: it gives no light and does not count as surface.
-#[expect(clippy::too_many_arguments, reason = "what is read, then the four tables that grow")]
-fn flatten(
-    scene: &Scene,
-    mesh: &Mesh,
-    world_from_object: &DMat4,
-    origin: DVec3,
-    emissions: &[[f64; 3]],
-    opacities: &Opacities,
-    parts: &mut Parts,
-    table: &mut TriangleTable,
-    lights: Option<&mut Vec<PreparedLight>>,
-    totals: &mut Totals,
-) {
-    let material = scene.materials.get(mesh.material.index());
-    let linear = scaled(DMat3::from_mat4(*world_from_object));
-    // Normals go by the cofactor matrix: no division, so nearly singular transforms stay finite. A mirroring transform
-    // (negative determinant) turns the winding; the corners are swapped back so that the front stays the front.
-    let mirrors = linear.determinant() < 0.0;
-    let normal_from_object = cofactor(linear) * if mirrors { -1.0 } else { 1.0 };
-    let lets_rays_pass = opacities.let_rays_pass(scene, mesh);
-    let part = parts.of(lets_rays_pass);
-    let triangles = &mut part.triangles;
-    let first = triangles.positions.len() as u32;
-    triangles.positions.extend(mesh.positions.iter().map(|&p| {
-        let p = world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3());
-        (p - origin).as_vec3().to_array()
-    }));
-    // Once a vertex, not once a corner: a vertex is in six triangles on average.
-    let vertex_normals: Option<Vec<glam::Vec3>> = mesh.normals.as_ref().map(|normals| {
-        let world = |&n: &[f32; 3]| (normal_from_object * glam::Vec3::from(n).as_dvec3()).normalize_or_zero().as_vec3();
-        normals.iter().map(world).collect()
-    });
-    let emission = emissions.get(mesh.material.index()).copied().unwrap_or_default();
-    // Mean over channels: what light may be expected of it.
-    let average = emission.iter().sum::<f64>() / 3.0;
-    let mut lamps = Vec::new();
-    let mut mesh_area = 0.0;
-    let needs_attributes = mesh.normals.is_some() || !mesh.uv_sets.is_empty() || mesh.colors.is_some();
-    for &[i, j, k] in &mesh.indices {
-        let [j, k] = if mirrors { [k, j] } else { [j, k] };
-        let corner = |v: u32| glam::Vec3::from(triangles.positions[(first + v) as usize]);
-        let corners = [corner(i), corner(j), corner(k)];
-        // In f64: the f32 product of edges below 3e-10 underflows.
-        let edges = corners.map(|c| c.as_dvec3());
-        if !edges.iter().all(is_usable) {
-            totals.too_far += 1;
-            continue;
-        }
-        let cross = (edges[1] - edges[0]).cross(edges[2] - edges[0]);
-        let area = 0.5 * cross.length();
-        if area == 0.0 {
-            totals.without_area += 1;
-            continue;
-        }
-        mesh_area += area;
-        // + 0 turns -0 into 0, here and below: the frame about a normal depends on the sign.
-        let ng = (cross / (2.0 * area)).as_vec3() + glam::Vec3::ZERO;
-        let mut normals = vertex_normals.as_ref().map(|n| [i, j, k].map(|v| n[v as usize]));
-        // As pbrt does: normals against the winding would light the triangle from behind.
-        let turns = normals.is_some_and(|n| n.iter().all(|n| n.dot(ng) < 0.0));
-        if turns {
-            totals.turned_normals += 1;
-            normals = normals.map(|n| n.map(|n| -n));
-        }
-        let normals = normals.map(|n| n.map(|n| n + glam::Vec3::ZERO));
-        let attributes = if needs_attributes { push_attributes(mesh, [i, j, k], normals, table) } else { NONE };
-        let tangents = mesh.tangents.as_ref().map_or(NONE, |t| {
-            table.push_tangents([i, j, k].map(|v| {
-                let [x, y, z, w] = t[v as usize];
-                let t = (linear * DVec3::new(f64::from(x), f64::from(y), f64::from(z))).normalize_or_zero().as_vec3();
-                // The bitangent stays when the normal turns.
-                [t.x, t.y, t.z, if mirrors != turns { -w } else { w }]
-            }))
-        });
-        let primitive = table.len() as u32;
-        part.primitives.push(triangles.indices.len(), primitive);
-        triangles.indices.push([i, j, k].map(|v| first + v));
-        table.push(corners, ng, mesh.material.0, attributes, tangents);
-        if lights.is_some() && average > 0.0 && area > LEAST_SAMPLED_AREA {
-            lamps.push(LampTriangle { corners, ng, area, primitive, attributes });
-        }
-    }
-    if let Some(lights) = lights {
-        let both_sides = material.is_some_and(|m| m.double_sided);
-        for triangles in connected(lamps) {
-            let material = mesh.material.0;
-            // What is there in part only would have to be asked about twice.
-            let shape = LampShape::of(&triangles, !lets_rays_pass);
-            lights.push(PreparedLight::Mesh { triangles, radiance: average, both_sides, material, shape });
-        }
-        totals.surface.add(mesh_area, material, emission);
-    }
-}
-
-/// Attributes of a triangle's corners.
-fn push_attributes(mesh: &Mesh, corners: [u32; 3], normals: Option<[glam::Vec3; 3]>, table: &mut TriangleTable) -> u32 {
-    let mut uvs = [[[0.0; 2]; 3]; MAX_UV_SETS];
-    let sets = mesh.uv_sets.len();
-    for (uv, set) in uvs.iter_mut().zip(&mesh.uv_sets) {
-        *uv = corners.map(|v| set[v as usize]);
-    }
-    let colors = mesh.colors.as_ref().map(|c| corners.map(|v| c[v as usize]));
-    table.push_attributes(&Corners { normals, uvs: &uvs[..sets], colors })
-}
-
 /// Adds the punctual lights that shine at all.
 fn punctual(scene: &Scene, origin: DVec3, settings: &RenderSettings, lights: &mut Vec<PreparedLight>) {
     let (radius, angular_radius) = (settings.light_radius, 0.5 * settings.sun_angle.to_radians());
-    for placed in &scene.lights {
-        let position = (placed.world_from_light.w_axis.truncate() - origin).as_vec3();
-        let axis = -placed.world_from_light.z_axis.truncate().normalize();
+    for (i, placed) in scene.lights.iter().enumerate() {
+        let position = |m: &DMat4| (m.w_axis.truncate() - origin).as_vec3();
+        let axis = |m: &DMat4| (-m.z_axis.truncate().normalize()).as_vec3();
+        let first = &placed.world_from_light;
+        let later = scene.motion.lights.get(&(i as u32)).map_or(&[][..], Vec::as_slice);
+        let later = if later.iter().all(|m| m == first) { &[] } else { later };
+        let point = |intensity, cone| {
+            let later = later.iter().map(|m| (position(m), axis(m))).collect();
+            PreparedLight::Point { position: position(first), intensity, cone, radius, later }
+        };
         let (light, color) = match placed.light {
-            Light::Point { intensity } => (PreparedLight::Point { position, intensity, cone: None, radius }, intensity),
+            Light::Point { intensity } => (point(intensity, None), intensity),
             Light::Spot { intensity, inner_cone, outer_cone } => {
                 let (inner, outer) = (f64::from(inner_cone).cos(), f64::from(outer_cone).cos());
-                let cone = Some((axis.as_vec3(), inner as f32, outer as f32));
-                (PreparedLight::Point { position, intensity, cone, radius }, intensity)
+                (point(intensity, Some((axis(first), inner as f32, outer as f32))), intensity)
             }
             Light::Directional { illuminance } => {
-                let towards = (-axis).as_vec3();
-                (PreparedLight::Directional { towards, illuminance, angular_radius }, illuminance)
+                let (towards, later) = (-axis(first), later.iter().map(|m| -axis(m)).collect());
+                (PreparedLight::Directional { towards, illuminance, angular_radius, later }, illuminance)
             }
         };
         // Not for NaN either.

@@ -5,6 +5,7 @@ use super::{CropWindow, Prepared, RenderSettings};
 use crate::camera::{Camera, CameraRays, PixelFilter};
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
+use glam::DMat4;
 use simd::Level;
 use std::borrow::Cow;
 
@@ -26,11 +27,21 @@ pub fn window(settings: &RenderSettings) -> CropWindow {
     settings.crop.unwrap_or(CropWindow { x: 0, y: 0, width: settings.width, height: settings.height })
 }
 
-/// The tracer of a picture.
+/// Where camera `index` of `scene` is at later times of the shutter; none if it stands still or is framed on the bounds.
+pub fn later(scene: &Scene, index: usize) -> &[DMat4] {
+    scene.motion.cameras.get(&(index as u32)).map_or(&[], Vec::as_slice)
+}
+
+/// The tracer of a picture of `camera`, which is at `later` after the shutter has opened.
 ///
 /// # Panics
 /// When `settings.lanes` is none of 1, 8, 16.
-pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSettings) -> PathTracer<'p> {
+pub fn tracer<'p>(
+    prepared: &'p Prepared,
+    camera: &Camera,
+    later: &[DMat4],
+    settings: &RenderSettings,
+) -> PathTracer<'p> {
     let level = match settings.lanes {
         None => Level::best(),
         Some(1) => Level::Scalar,
@@ -42,7 +53,7 @@ pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSett
     PathTracer {
         tables: &prepared.tables,
         accel: &*prepared.accel,
-        camera: CameraRays::new(camera, settings.width, settings.height, prepared.origin),
+        camera: CameraRays::new(camera, later, settings.width, settings.height, prepared.origin),
         filter: PixelFilter::new(settings.filter.shape, settings.filter.width),
         max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
         is_capped: settings.max_bounces.is_none(),

@@ -1,6 +1,6 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
-use super::{ImageId, Instance, MaterialId, MeshId, PlacedLight, Scene, Skipped, SourceFile, TextureId};
+use super::{ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, Scene, Skipped, SourceFile, TextureId};
 use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;
@@ -80,6 +80,11 @@ impl SceneBuilder {
     /// Adds a camera.
     pub fn add_camera(&mut self, camera: Camera) {
         self.scene.cameras.push(camera);
+    }
+
+    /// What moves while the shutter is open, to be added to.
+    pub fn motion(&mut self) -> &mut Motion {
+        &mut self.scene.motion
     }
 
     /// Says which files the scene was made from.

@@ -1,6 +1,6 @@
 //! What every scene must satisfy before it is prepared.
 
-use super::Scene;
+use super::{Scene, motion};
 use crate::math::MAX_UV_SETS;
 use crate::shape::Mesh;
 use glam::{DMat3, DVec3};
@@ -33,7 +33,10 @@ struct Found {
 /// When an id, a vertex index or the length of an attribute is wrong: a bug of the loader.
 pub(super) fn check(scene: &mut Scene) {
     check_ids(scene);
-    let found: Vec<Found> = scene.meshes.par_iter_mut().map(check_mesh).collect();
+    motion::clean(scene);
+    let changes = &scene.motion.meshes;
+    let check_mesh = |(i, mesh)| check_mesh(mesh, changes.contains_key(&(i as u32)));
+    let found: Vec<Found> = scene.meshes.par_iter_mut().enumerate().map(check_mesh).collect();
     type Count = fn(&Found) -> usize;
     // What has no area would not be seen anyway; all else is lost.
     let kinds: [(Count, bool, &str); 4] = [
@@ -69,8 +72,9 @@ fn clean_environment(scene: &mut Scene) {
     }
 }
 
-fn check_mesh(mesh: &mut Mesh) -> Found {
-    let [unusable, flat] = drop_triangles(mesh);
+/// `changes` its form: what has no area when the shutter opens may have some later.
+fn check_mesh(mesh: &mut Mesh, changes: bool) -> Found {
+    let [unusable, flat] = drop_triangles(mesh, changes);
     Found { unusable, flat, uvs: clean_uvs(mesh), colors: clean_colors(mesh) }
 }
 
@@ -79,12 +83,23 @@ fn check_mesh(mesh: &mut Mesh) -> Found {
 /// plane stays: triangles in that plane can be seen, and `render::prepare` drops the others one by one.
 fn drop_instances(scene: &mut Scene) {
     let mut squashed = Tally::default();
-    scene.instances.retain(|instance| {
+    let Scene { instances, motion, .. } = scene;
+    let moving = std::mem::take(&mut motion.instances);
+    let (mut i, mut kept) = (0, 0);
+    instances.retain(|instance| {
+        let later = moving.get(&i);
+        i += 1;
         let m = DMat3::from_mat4(instance.world_from_object);
         let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
         let has_area = [x.cross(y), y.cross(z), z.cross(x)].iter().any(|c| *c != DVec3::ZERO);
-        squashed.add(usize::from(!has_area), &instance.name);
-        has_area
+        // What moves may be squashed at one time only.
+        let keeps = has_area || later.is_some();
+        squashed.add(usize::from(!keeps), &instance.name);
+        if keeps {
+            motion.instances.extend(later.map(|later| (kept, later.clone())));
+            kept += 1;
+        }
+        keeps
     });
     scene.warnings.extend(squashed.text("instances dropped: their scale squashes them to a line or a point"));
 }
@@ -119,11 +134,11 @@ fn check_ids(scene: &Scene) {
 }
 
 /// How many triangles of `mesh` were dropped: for an unusable vertex, for want of area.
-fn drop_triangles(mesh: &mut Mesh) -> [usize; 2] {
+fn drop_triangles(mesh: &mut Mesh, keeps_flat: bool) -> [usize; 2] {
     let positions = &mesh.positions;
     let judge = |triangle: &[u32; 3]| {
         let corners = triangle.map(|i| positions[i as usize]);
-        if !corners.iter().all(usable) { [1, 0] } else { [0, usize::from(is_flat(corners))] }
+        if !corners.iter().all(usable) { [1, 0] } else { [0, usize::from(!keeps_flat && is_flat(corners))] }
     };
     // First counted, in parallel: nearly always there is nothing to drop.
     let count = |piece: &[[u32; 3]]| piece.iter().map(judge).fold([0, 0], sum);

@@ -1,5 +1,6 @@
 //! Shapes: for now triangle meshes.
 
+pub mod moving;
 pub mod placement;
 pub mod table;
 

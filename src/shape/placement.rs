@@ -3,9 +3,10 @@
 //! A placed mesh has its triangles in the table once, in its own space. What shading reads there is carried to the
 //! prepared space here, in the lanes whose hit was on a placement.
 
+use super::moving::segment;
 use crate::math::{V3, robust};
 use glam::{DMat3, DVec3, Vec3};
-use simd::{Lanes, Mask, Uint};
+use simd::{Float, Lanes, Mask, Uint};
 
 /// Records a placement.
 const RECORDS: u32 = 7;
@@ -20,6 +21,11 @@ const RECORDS: u32 = 7;
 #[derive(Clone, Debug, Default)]
 pub struct PlacementTable {
     records: Vec<[f32; 4]>,
+    /// Of placements that move the rows 0 to 2 at every key, and which those are.
+    keys: Vec<[f32; 4]>,
+    /// By the `instance` of a hit: the first record of its `keys`, and one less than it has of them, or 0. Empty where
+    /// nothing moves.
+    moving: Vec<[f32; 4]>,
 }
 
 /// The placements that lanes hit.
@@ -83,11 +89,20 @@ pub fn cofactor(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
+fn record(v: DVec3, w: f64) -> [f32; 4] {
+    [v.x as f32, v.y as f32, v.z as f32, w as f32]
+}
+
+fn map(columns: [Vec3; 3], translation: Vec3) -> (DMat3, DVec3) {
+    let [x, y, z] = columns.map(Vec3::as_dvec3);
+    (DMat3::from_cols(x, y, z), translation.as_dvec3())
+}
+
 impl PlacementTable {
     /// Room for `n` placements.
     pub fn with_capacity(n: usize) -> Self {
         let records = if n == 0 { Vec::new() } else { Vec::with_capacity(RECORDS as usize * (n + 1)) };
-        Self { records }
+        Self { records, ..Self::default() }
     }
 
     /// Adds a placement: the images of the axes and of the origin in the prepared space, as the backend has them. They
@@ -95,19 +110,52 @@ impl PlacementTable {
     pub fn push(&mut self, columns: [Vec3; 3], translation: Vec3) {
         if self.records.is_empty() {
             // The world, so that lanes which hit nothing placed read something.
-            self.add(DMat3::IDENTITY, DVec3::ZERO);
+            self.add(DMat3::IDENTITY, DVec3::ZERO, PlacementError::of(DMat3::IDENTITY, DVec3::ZERO));
         }
-        let [x, y, z] = columns.map(Vec3::as_dvec3);
-        self.add(DMat3::from_cols(x, y, z), translation.as_dvec3());
+        let (linear, translation) = map(columns, translation);
+        self.add(linear, translation, PlacementError::of(linear, translation));
+        if !self.moving.is_empty() {
+            self.moving.push([0.0; 4]);
+        }
     }
 
-    fn add(&mut self, linear: DMat3, translation: DVec3) {
-        let PlacementError { per_metre, at_origin } = PlacementError::of(linear, translation);
+    /// Adds a placement that moves: its maps at evenly spaced times, at least two, as [`Self::push`] takes them.
+    pub fn push_moving(&mut self, keys: &[([Vec3; 3], Vec3)]) {
+        debug_assert!(keys.len() >= 2, "what has one key does not move");
+        let maps: Vec<_> = keys.iter().map(|&(columns, translation)| map(columns, translation)).collect();
+        if self.records.is_empty() {
+            self.add(DMat3::IDENTITY, DVec3::ZERO, PlacementError::of(DMat3::IDENTITY, DVec3::ZERO));
+        }
+        // Of what came before, the world among it.
+        self.moving.resize(self.records.len() / RECORDS as usize, [0.0; 4]);
+        // Between keys the map is no further from singular than at the worst of them, unless it turns a long way from one
+        // to the next; twice the bound leaves room for that and for the interpolation's own three roundings.
+        let worst = |of: fn(&PlacementError) -> DVec3| {
+            let errors = maps.iter().map(|&(linear, translation)| PlacementError::of(linear, translation));
+            2.0 * errors.map(|error| of(&error)).fold(DVec3::ZERO, DVec3::max)
+        };
+        let error = PlacementError { per_metre: worst(|e| e.per_metre), at_origin: worst(|e| e.at_origin) };
+        self.add(maps[0].0, maps[0].1, error);
+        let first = self.keys.len() as u32;
+        for (linear, translation) in &maps {
+            for axis in 0..3 {
+                self.keys.push(record(linear.row(axis), translation[axis]));
+            }
+        }
+        self.moving.push([f32::from_bits(first), f32::from_bits(keys.len() as u32 - 1), 0.0, 0.0]);
+    }
+
+    /// Some of them move.
+    pub fn moves(&self) -> bool {
+        !self.moving.is_empty()
+    }
+
+    fn add(&mut self, linear: DMat3, translation: DVec3, error: PlacementError) {
+        let PlacementError { per_metre, at_origin } = error;
         let unit = scaled(linear);
         let side = if unit.determinant() < 0.0 { -1.0 } else { 1.0 };
         // Scaled again: the cofactors of a squashed map are small.
         let normals = scaled(cofactor(unit)) * side;
-        let record = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
         for axis in 0..3 {
             self.records.push(record(linear.row(axis), translation[axis]));
         }
@@ -130,9 +178,9 @@ impl PlacementTable {
     /// Bytes held a placement.
     pub const BYTES: usize = RECORDS as usize * size_of::<[f32; 4]>();
 
-    /// What the lanes of `hit` hit; `None` where none of them hit a placement, which needs no carrying.
+    /// What the lanes of `hit` hit at `time`; `None` where none of them hit a placement, which needs no carrying.
     #[inline(always)]
-    pub fn get<L: Lanes>(&self, instance: L::U, hit: L::M) -> Option<Placed<L>> {
+    pub fn get<L: Lanes>(&self, instance: L::U, time: L::F, hit: L::M) -> Option<Placed<L>> {
         let zero = L::U::splat(0);
         let lanes = hit & !instance.eq(zero);
         if !lanes.any() {
@@ -146,7 +194,7 @@ impl PlacementTable {
         let r4 = (at + L::U::splat(4)).records(&self.records);
         let r5 = (at + L::U::splat(5)).records(&self.records);
         let r6 = (at + L::U::splat(6)).records(&self.records);
-        Some(Placed {
+        let mut placed = Placed {
             lanes,
             rows: [V3::<L>::of_record(&r0), V3::<L>::of_record(&r1), V3::<L>::of_record(&r2)],
             translation: V3::new(r0[3], r1[3], r2[3]),
@@ -154,8 +202,58 @@ impl PlacementTable {
             per_metre: V3::new(r3[3], r4[3], r5[3]),
             at_origin: V3::<L>::of_record(&r6),
             side: r6[3],
-        })
+        };
+        if self.moves() {
+            placed = self.moved(placed, instance, time);
+        }
+        Some(placed)
     }
+
+    /// `placed` at `time` in the lanes that hit something that moves. The elements are interpolated as the ray kernels do
+    /// it, and the cofactors are those of what comes out.
+    #[inline(always)]
+    fn moved<L: Lanes>(&self, placed: Placed<L>, instance: L::U, time: L::F) -> Placed<L> {
+        let entry = instance.or_else(placed.lanes, L::U::splat(0)).records(&self.moving);
+        let last = entry[1].to_bits();
+        let lanes = placed.lanes & !last.eq(L::U::splat(0));
+        if !lanes.any() {
+            return placed;
+        }
+        let (one, three) = (L::U::splat(1), L::U::splat(3));
+        let (k, s) = segment::<L>(last.or_else(lanes, one), time);
+        let at = (entry[0].to_bits() + k * three).or_else(lanes, L::U::splat(0));
+        let mut rows = placed.rows;
+        let mut translation = [placed.translation.x, placed.translation.y, placed.translation.z];
+        for (axis, (row, shift)) in rows.iter_mut().zip(&mut translation).enumerate() {
+            let at = at + L::U::splat(axis as u32);
+            let (a, b) = (at.records(&self.keys), (at + three).records(&self.keys));
+            let (before, after) = (V3::<L>::of_record(&a), V3::<L>::of_record(&b));
+            *row = (before + (after - before).scale(s)).or_else(lanes, *row);
+            *shift = (a[3] + (b[3] - a[3]) * s).or_else(lanes, *shift);
+        }
+        let ([nx, ny, nz], side) = cofactors(&rows);
+        let [x, y, z] = placed.normal_rows;
+        Placed {
+            rows,
+            translation: V3::new(translation[0], translation[1], translation[2]),
+            normal_rows: [nx.or_else(lanes, x), ny.or_else(lanes, y), nz.or_else(lanes, z)],
+            side: side.or_else(lanes, placed.side),
+            ..placed
+        }
+    }
+}
+
+/// Rows of the cofactors of the matrix with these `rows`, of any length but in the range of f32, times the sign of its
+/// determinant; and that sign.
+#[inline(always)]
+fn cofactors<L: Lanes>(rows: &[V3<L>; 3]) -> ([V3<L>; 3], L::F) {
+    let largest = rows[0].abs().max(rows[1].abs()).max(rows[2].abs()).max_component();
+    let per = L::F::one() / largest;
+    let [x, y, z] = [rows[0].scale(per), rows[1].scale(per), rows[2].scale(per)];
+    // The cofactors of the transpose are the transpose of the cofactors.
+    let (a, b, c) = (y.cross(z), z.cross(x), x.cross(y));
+    let side = L::F::one().copysign(x.dot(a));
+    ([a.scale(side), b.scale(side), c.scale(side)], side)
 }
 
 #[inline(always)]
@@ -192,7 +290,6 @@ impl<L: Lanes> Placed<L> {
     /// The handedness `w` of a tangent: the other one where the object is mirrored.
     #[inline(always)]
     pub fn handedness(&self, w: L::F) -> L::F {
-        use simd::Float;
         (w * self.side).or_else(self.lanes, w)
     }
 
@@ -206,7 +303,6 @@ impl<L: Lanes> Placed<L> {
 
 #[inline(always)]
 fn unit_or_null<L: Lanes>(v: V3<L>) -> V3<L> {
-    use simd::Float;
     // By its largest component first: the squares of a vector that a small scale shrank leave the range of f32.
     let v = v.scale(L::F::one() / v.abs().max_component());
     let unit = v.normalized();
@@ -282,7 +378,7 @@ mod tests {
             fn run<L: Lanes>(self) {
                 for (cond, case) in cases() {
                     let table = case.table();
-                    let placed = table.get::<L>(L::U::splat(1), L::M::first(L::N)).expect("a placement");
+                    let placed = table.get::<L>(L::U::splat(1), L::F::zero(), L::M::first(L::N)).expect("a placement");
                     let n = Vec3::new(0.48, -0.6, 0.64);
                     let (linear, _) = case.rounded();
                     // In units of its largest element, where f64 has no trouble with determinants.
@@ -309,7 +405,7 @@ mod tests {
             fn run<L: Lanes>(self) {
                 for (_, case) in cases() {
                     let table = case.table();
-                    let placed = table.get::<L>(L::U::splat(1), L::M::first(L::N)).expect("a placement");
+                    let placed = table.get::<L>(L::U::splat(1), L::F::zero(), L::M::first(L::N)).expect("a placement");
                     let p = Vec3::new(0.9, -0.31, 0.77);
                     let exact = case.linear * p.as_dvec3() + case.translation;
                     let apart = (get(placed.point(V3::splat(p.to_array()))) - exact).abs();
@@ -336,11 +432,11 @@ mod tests {
                 let table =
                     Case { linear: DMat3::from_diagonal(DVec3::new(-2.0, 3.0, 1.0)), translation: DVec3::X }.table();
                 let all = L::M::first(L::N);
-                assert!(table.get::<L>(L::U::splat(0), all).is_none());
-                assert!(table.get::<L>(L::U::splat(1), L::M::from_bits(0)).is_none());
+                assert!(table.get::<L>(L::U::splat(0), L::F::zero(), all).is_none());
+                assert!(table.get::<L>(L::U::splat(1), L::F::zero(), L::M::from_bits(0)).is_none());
                 // The first lane hit the placement, the others the world.
                 let instance = L::U::splat(1).or_else(L::M::first(1), L::U::splat(0));
-                let placed = table.get::<L>(instance, all).expect("a lane that hit a placement");
+                let placed = table.get::<L>(instance, L::F::zero(), all).expect("a lane that hit a placement");
                 let (mut out, v) = ([0.0; 16], V3::<L>::splat([1.0, 0.5, 0.25]));
                 placed.point(v).x.store(&mut out, 0);
                 assert_eq!(out[0], -1.0);

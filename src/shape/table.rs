@@ -1,6 +1,7 @@
 //! Triangles as shading reads them: four 16-byte records, one cache line, a triangle. Those of placed meshes are there
 //! once, in their object's space; `placement.rs` carries what is read to the prepared space.
 
+use super::moving::{Moved, MovingTriangles};
 use super::placement::Placed;
 use crate::math::{MAX_UV_SETS, UvSets, V3, robust};
 use simd::{Float, Lanes, Mask, Uint};
@@ -48,6 +49,8 @@ pub struct TriangleTable {
     has_colors: bool,
     /// Three a triangle with a normal map: tangent and handedness of each corner.
     tangents: Vec<[f32; 4]>,
+    /// Those that move by their vertices; what is said of them above holds when the shutter opens.
+    pub moving: MovingTriangles,
 }
 
 /// One triangle's record, per lane.
@@ -282,10 +285,17 @@ impl TriangleTable {
         areas
     }
 
-    /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`), of a triangle that is `placed`; the
-    /// table must have some.
+    /// Tangent (not normalised) and handedness `index` at barycentric (`u`, `v`), of a triangle that is `placed` or has
+    /// `moved`; the table must have some.
     #[inline(always)]
-    pub fn tangent<L: Lanes>(&self, index: L::U, u: L::F, v: L::F, placed: &Option<Placed<L>>) -> (V3<L>, L::F) {
+    pub fn tangent<L: Lanes>(
+        &self,
+        index: L::U,
+        u: L::F,
+        v: L::F,
+        placed: &Option<Placed<L>>,
+        moved: &Option<Moved<L>>,
+    ) -> (V3<L>, L::F) {
         let at = index + index + index;
         let one = L::U::splat(1);
         let t0 = at.records(&self.tangents);
@@ -294,6 +304,9 @@ impl TriangleTable {
         let (mut a, mut b, mut c) =
             (V3::<L>::new(t0[0], t0[1], t0[2]), V3::<L>::new(t1[0], t1[1], t1[2]), V3::<L>::new(t2[0], t2[1], t2[2]));
         let mut handedness = t0[3];
+        if let Some(moved) = moved {
+            [a, b, c] = self.moving.tangents([a, b, c], moved);
+        }
         if let Some(placed) = placed {
             (a, b, c) = (placed.direction(a), placed.direction(b), placed.direction(c));
             handedness = placed.handedness(handedness);
