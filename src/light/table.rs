@@ -46,6 +46,8 @@ pub struct LightTable {
     most_ends: u32,
     emissive_meshes: usize,
     emissive_triangles: usize,
+    /// Glowing spheres that are no mesh.
+    exact_balls: usize,
     /// Surfaces that are sampled by points on them.
     has_lamps: bool,
     /// Some of them by the solid angle that they fill.
@@ -73,7 +75,7 @@ impl LightTable {
     ) -> Self {
         // Stable: surfaces, balls, points, suns.
         lights.sort_by_key(|light| match light {
-            PreparedLight::Mesh { .. } => 0,
+            PreparedLight::Mesh { .. } | PreparedLight::Ball { .. } => 0,
             PreparedLight::Point { radius, .. } => 1 + u8::from(*radius <= 0.0),
             PreparedLight::Directional { .. } => 3,
         });
@@ -111,6 +113,12 @@ impl LightTable {
                 self.push_lamp(lamps, *material, shape);
                 self.emissive_meshes += 1;
                 self.emissive_triangles += lamps.len();
+            }
+            PreparedLight::Ball { bulb, primitive, .. } => {
+                triangles.set_light(*primitive as usize, self.lights.len() as u32);
+                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
+                self.has_bulbs = true;
+                self.exact_balls += 1;
             }
             &PreparedLight::Point { position, intensity, cone, radius } => {
                 if radius > 0.0 {
@@ -192,7 +200,7 @@ impl LightTable {
 
     /// Some light can be hit by a ray.
     pub fn has_triangles(&self) -> bool {
-        self.emissive_triangles > 0
+        self.emissive_triangles > 0 || self.exact_balls > 0
     }
 
     /// There is light from all around.
@@ -352,6 +360,10 @@ fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64) -> Candid
             PreparedLight::Mesh { triangles, radiance, both_sides, .. } => {
                 let corners: Vec<[DVec3; 3]> = triangles.iter().map(|t| t.corners.map(|c| c.as_dvec3())).collect();
                 candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides));
+                candidates.surfaces += 1;
+            }
+            PreparedLight::Ball { bulb, radiance, both_sides, .. } => {
+                candidates.placed.push(Bounds::of_ball(bulb.centre.as_dvec3(), bulb.radius, *radiance, *both_sides));
                 candidates.surfaces += 1;
             }
             &PreparedLight::Point { position, intensity, cone, radius } => {

@@ -23,5 +23,6 @@ pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)>
         ("unlit", tables.materials.has_unlit()),
         ("vertex_colors", tables.triangles.has_colors()),
         ("instances", !tables.placements.is_empty()),
+        ("exact_shapes", !tables.shapes.is_empty()),
     ]
 }

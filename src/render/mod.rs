@@ -15,6 +15,7 @@ mod progress;
 mod refraction;
 mod schedule;
 mod settings;
+mod shapes;
 mod stopping;
 mod tracer;
 

@@ -11,6 +11,8 @@ use std::collections::BTreeMap;
 pub struct Motion {
     /// World from object space.
     pub instances: BTreeMap<u32, Vec<DMat4>>,
+    /// World from object space of exact shapes.
+    pub shapes: BTreeMap<u32, Vec<DMat4>>,
     /// Meshes that change their form.
     pub meshes: BTreeMap<u32, Vec<Pose>>,
     /// World from camera space, rigid.
@@ -33,7 +35,7 @@ pub struct Pose {
 impl Motion {
     /// Whether nothing moves.
     pub fn is_empty(&self) -> bool {
-        let Self { instances, meshes, cameras, lights } = self;
-        instances.is_empty() && meshes.is_empty() && cameras.is_empty() && lights.is_empty()
+        let Self { instances, shapes, meshes, cameras, lights } = self;
+        instances.is_empty() && shapes.is_empty() && meshes.is_empty() && cameras.is_empty() && lights.is_empty()
     }
 }
