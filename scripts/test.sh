@@ -102,6 +102,9 @@ if [ -n "$long" ]; then
   target/release/prt-batch verify light
   target/release/prt-batch verify light --accel bvh --seed "$(date +%j)"
   summary+=("verify light: passed")
+  # SOR-02 and -04: the full numbers.
+  target/release/prt-batch verify shapes --rays 40000 --random 1000 --seed "$(date +%j)"
+  summary+=("verify shapes: passed")
   if [ -x scripts/reference_check.sh ]; then
     scripts/reference_check.sh
     summary+=("reference check: passed")

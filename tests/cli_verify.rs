@@ -80,11 +80,24 @@ fn materials_of_a_scene_pass_and_random_ones_are_for_the_built_in_ones() {
 }
 
 #[test]
+fn shapes_pass_and_take_no_inputs() {
+    let (code, stdout, stderr) = verify(&["shapes", "--rays", "200", "--random", "10", "--seed", "2"]);
+    assert!(code == 0 && stdout.contains("bottle") && stdout.contains("passed"), "{code} {stdout}{stderr}");
+    let (code, stdout, _) = verify(&["shapes", "--rays", "100", "--random", "0", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    assert!(code == 0 && report["passed"] == true && report["profiles"][0]["missed"] == 0, "{stdout}");
+    let (code, _, stderr) = verify(&["shapes", &scene()]);
+    assert!(code == 2 && stderr.contains("profiles of its own"), "{code} {stderr}");
+    let (code, _, stderr) = verify(&["shapes", "--accel", "bvh"]);
+    assert!(code == 2 && stderr.contains("--accel means nothing to verify shapes"), "{code} {stderr}");
+}
+
+#[test]
 fn what_is_not_built_is_refused_by_name() {
-    for what in ["lens", "shapes", "output"] {
+    for what in ["lens", "output"] {
         let (code, _, stderr) = verify(&[what]);
         assert!(
-            code == 2 && stderr.contains(&format!("{what} is not built yet; built: hits, materials, light")),
+            code == 2 && stderr.contains(&format!("{what} is not built yet; built: hits, materials, light, shapes")),
             "{code} {stderr}"
         );
     }

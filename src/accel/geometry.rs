@@ -25,7 +25,8 @@ pub struct Geometry {
 pub struct Object {
     /// Triangles.
     pub parts: Vec<Part>,
-    /// Exact shapes, each with its primitive number.
+    /// Exact shapes, each with its primitive number. Those that are filtered must be the world's: Embree does not tell
+    /// them which placement they are in.
     pub shapes: Vec<(Arc<dyn Shape>, u32)>,
 }
 
@@ -190,7 +191,7 @@ pub fn segment(keys: usize, time: f32) -> (usize, f32) {
     (k, at - k as f32)
 }
 
-/// A ray and one crossing of it with a filtered triangle.
+/// A ray and one crossing of it with a filtered triangle or shape.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
     /// The ray's [`key`](super::RayBatch::key).
@@ -199,13 +200,13 @@ pub struct Candidate {
     pub instance: u32,
     /// Primitive number.
     pub primitive: u32,
-    /// Barycentric weight of the second vertex.
+    /// Barycentric weight of the second vertex; of a shape its first surface parameter.
     pub u: f32,
-    /// Barycentric weight of the third vertex.
+    /// Barycentric weight of the third vertex; of a shape its second surface parameter.
     pub v: f32,
 }
 
-/// Decides which crossings with filtered triangles are hits: surfaces that are not all there. A pure function, since every
+/// Decides which crossings with filtered triangles and shapes are hits: surfaces that are not all there. A pure function, since every
 /// backend asks in another order and about other crossings.
 pub trait HitFilter: Send + Sync {
     /// Whether the ray is stopped there.
@@ -247,6 +248,50 @@ pub trait Shape: Send + Sync {
     /// Whether there is any; must agree with [`Shape::intersect`].
     fn occludes(&self, ray: &ShapeRay) -> bool {
         self.intersect(ray).is_some()
+    }
+
+    /// Whether the geometry's filter is asked about its crossings.
+    fn is_filtered(&self) -> bool {
+        false
+    }
+
+    /// The nearest crossing with t in (0, `t_max`) that `stops` the ray; asked of what is filtered. Whoever has more than
+    /// one crossing and is filtered must look at all of them.
+    fn intersect_where(&self, ray: &ShapeRay, stops: &mut dyn FnMut(&ShapeHit) -> bool) -> Option<ShapeHit> {
+        self.intersect(ray).filter(|hit| stops(hit))
+    }
+}
+
+/// A ray at a shape, as a filter knows it.
+#[derive(Clone, Copy)]
+pub struct AtShape<'a> {
+    /// The shape.
+    pub shape: &'a dyn Shape,
+    /// Its primitive number.
+    pub primitive: u32,
+    /// 0 for the world, i + 1 for placement i.
+    pub instance: u32,
+    /// The ray's [`key`](super::RayBatch::key).
+    pub key: u32,
+    /// Decides about hits on what is filtered; without one nothing stops there.
+    pub filter: Option<&'a dyn HitFilter>,
+}
+
+impl AtShape<'_> {
+    /// The nearest crossing that counts.
+    pub fn intersect(&self, ray: &ShapeRay) -> Option<ShapeHit> {
+        if !self.shape.is_filtered() {
+            return self.shape.intersect(ray);
+        }
+        let &Self { primitive, instance, key, filter, .. } = self;
+        let filter = filter?;
+        let stops = &mut |hit: &ShapeHit| filter.stops(&Candidate { key, instance, primitive, u: hit.u, v: hit.v });
+        self.shape.intersect_where(ray, stops)
+    }
+
+    /// Whether there is any crossing that counts.
+    pub fn occludes(&self, ray: &ShapeRay) -> bool {
+        if self.shape.is_filtered() { self.intersect(ray).is_some() } else { self.shape.occludes(ray) }
     }
 }
 

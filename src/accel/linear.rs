@@ -1,6 +1,6 @@
 //! Brute force as an [`super::Accel`]: the oracle of the tests, and nothing else.
 
-use super::geometry::{Affine, Candidate, Geometry, Object, Part, Placement, Shape, ShapeRay};
+use super::geometry::{Affine, AtShape, Candidate, Geometry, Object, Part, Placement, ShapeRay};
 use super::woop::{ShearedRay, can_be_hit};
 use super::{Accel, AccelStats, HitBatch, MISS, RayBatch};
 use glam::Vec3;
@@ -83,7 +83,9 @@ impl Linear {
             }
         }
         for (shape, primitive) in &object.shapes {
-            if let Some(hit) = Shape::intersect(&**shape, ray) {
+            let filter = self.geometry.filter.as_deref();
+            let at = AtShape { shape: &**shape, primitive: *primitive, instance, key, filter };
+            if let Some(hit) = at.intersect(ray) {
                 each(Found { t: hit.t, u: hit.u, v: hit.v, instance, primitive: *primitive })?;
             }
         }

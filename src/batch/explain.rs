@@ -359,7 +359,7 @@ impl File<'_> {
         (render.width, render.height) = size_for(settings.size, scene, camera);
         (plan.width, plan.height) = (Some(render.width), Some(render.height));
         plan.notes.extend(aspect_note(settings.size, scene, camera));
-        if scene.triangle_count() == 0 {
+        if scene.is_empty() {
             plan.prospect = Prospect::Empty;
             plan.warnings.push("nothing drawable: the scene has no triangles; no picture would be written".into());
             return Ok(());

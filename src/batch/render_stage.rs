@@ -150,7 +150,7 @@ impl RenderStage {
         progress: &Progress,
         image: &mut ImageReport,
     ) -> Result<Option<(Frame, RenderSettings)>, Interrupted> {
-        if scene.triangle_count() == 0 {
+        if scene.is_empty() {
             image.status = Status::Empty;
             image.warnings.push("nothing drawable: the scene has no triangles; no picture was written".into());
             return Ok(None);

@@ -45,7 +45,11 @@ impl<L: Lanes> Cone<L> {
     pub fn footprints(&self, tables: &SceneTables, si: &Interaction<L>, hit: L::M) -> [L::F; MAX_UV_SETS] {
         let zero = L::F::zero();
         let has = hit & !si.triangle.attributes.eq(L::U::splat(NONE));
-        if !tables.triangles.has_attributes() || !has.any() {
+        let on_shape = hit & si.on_shape;
+        if !(tables.triangles.has_attributes() && has.any()) {
+            if on_shape.any() {
+                return [self.on_shape(si).masked(on_shape); MAX_UV_SETS];
+            }
             return [zero; MAX_UV_SETS];
         }
         let across = si.triangle.e1.cross(si.triangle.e2);
@@ -56,7 +60,21 @@ impl<L: Lanes> Cone<L> {
         for area in &mut areas {
             *area = (*area * per_area * width).masked(has);
         }
+        if on_shape.any() {
+            let own = self.on_shape(si);
+            for area in &mut areas {
+                *area = own.or_else(on_shape, *area);
+            }
+        }
         areas
+    }
+
+    /// [`Self::footprints`] on exact shapes, whose derivatives span a unit of coordinates: finite at their poles too.
+    #[inline(always)]
+    fn on_shape(&self, si: &Interaction<L>) -> L::F {
+        let across = si.triangle.e1.cross(si.triangle.e2);
+        let width = self.width / si.wo.dot(si.triangle.ng).abs();
+        (width / across.dot(across).sqrt() * width).min(L::F::splat(f32::MAX))
     }
 
     /// Writes the cones that go on in the lanes of `alive` as paths `to ..`: wider where they were scattered with the

@@ -8,6 +8,7 @@ use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::math::V3;
 use crate::math::lanes::tests::at_all_levels;
+use crate::shape::exact::table::ShapeTable;
 use crate::shape::placement::PlacementTable;
 use crate::shape::table::{Corners, TriangleTable};
 use crate::texture::lookup::TextureTable;
@@ -26,6 +27,7 @@ fn tables() -> SceneTables {
     SceneTables {
         triangles,
         placements: PlacementTable::with_capacity(0),
+        shapes: ShapeTable::default(),
         materials,
         media: MediumTable::new(&[Material::default()]),
         spectrum: None,

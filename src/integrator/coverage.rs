@@ -8,6 +8,7 @@ use super::SceneTables;
 use crate::accel::geometry::{Candidate, HitFilter};
 use crate::math::UvSets;
 use crate::sampler::coverage_number;
+use crate::shape::exact::table::texture_coordinates;
 use crate::shape::table::NONE;
 use simd::{Float, Kernel, Lanes, Mask, Uint, dispatch_one};
 use std::sync::Arc;
@@ -46,6 +47,10 @@ impl Kernel for Stops<'_> {
         if !triangle.attributes.eq(L::U::splat(NONE)).any() {
             let a = tables.triangles.attributes::<L>(triangle.attributes, L::F::splat(u), L::F::splat(v));
             (uvs, vertex_opacity) = (a.uvs, a.opacity);
+        }
+        if tables.shapes.get(self.candidate.primitive).is_some() {
+            let [u, v] = texture_coordinates(u, v);
+            uvs = UvSets::single(L::F::splat(u), L::F::splat(v));
         }
         let all = L::M::first(L::N);
         let coverage = tables.materials.coverage::<L>(&tables.textures, triangle.material, &uvs, vertex_opacity, all);

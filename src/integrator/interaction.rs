@@ -1,6 +1,7 @@
 //! Where a path has hit: geometry, attributes, the normals it is shaded with, and the point from which it goes on.
 
 use super::SceneTables;
+use super::exact;
 use super::terminator::lift;
 use crate::accel::HitBatch;
 use crate::math::{UvSets, V3, robust};
@@ -44,6 +45,8 @@ pub(super) struct Interaction<L: Lanes> {
     pub has_normal: L::M,
     /// Barycentric coordinates.
     pub b: [L::F; 2],
+    /// Hits of exact shapes: the triangle's edges are the derivatives along which their tangents run.
+    pub on_shape: L::M,
 }
 
 /// Which placements were hit by the rays `at ..`: nobody asks in scenes where nothing is placed.
@@ -133,7 +136,7 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
                 }
             }
         }
-        Interaction {
+        let mut si = Interaction {
             triangle,
             placed,
             moved,
@@ -151,11 +154,31 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
             normal,
             has_normal,
             b,
+            on_shape: none,
+        };
+        if !tables.shapes.is_empty() {
+            exact::put(tables, hits, at, primitive, hit, &mut si);
         }
+        si
     }
 }
 
 impl<L: Lanes> Interaction<L> {
+    /// Tangent of the front (not normalised) and handedness; arbitrary where the surface has none. Some must have.
+    #[inline(always)]
+    pub fn tangent(&self, tables: &SceneTables) -> (V3<L>, L::F) {
+        let (tangent, handedness) =
+            tables.triangles.tangent::<L>(self.triangle.tangents, self.b[0], self.b[1], &self.placed, &self.moved);
+        if !self.on_shape.any() {
+            return (tangent, handedness);
+        }
+        // The bitangent is towards smaller v, as that of a mesh.
+        let Triangle { e1, e2, ng, .. } = self.triangle;
+        let side = L::F::one().copysign(-(ng.cross(e1).dot(e2)));
+        let along = e1.scale(L::F::one() / e1.abs().max_component());
+        (along.or_else(self.on_shape, tangent), side.or_else(self.on_shape, handedness))
+    }
+
     /// A normal of the front turned to the viewer's side.
     #[inline(always)]
     pub fn to_viewer(&self, normal: V3<L>) -> V3<L> {

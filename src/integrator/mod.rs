@@ -10,6 +10,7 @@ mod cone;
 mod coverage;
 mod dispersion;
 mod emission;
+mod exact;
 mod interaction;
 mod light_sample;
 mod medium;
@@ -34,6 +35,7 @@ use crate::camera::{CameraRays, PixelFilter};
 use crate::light::table::{LightTable, Sources};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
+use crate::shape::exact::table::ShapeTable;
 use crate::shape::placement::PlacementTable;
 use crate::shape::table::TriangleTable;
 use crate::texture::lookup::TextureTable;
@@ -45,6 +47,8 @@ pub struct SceneTables {
     pub triangles: TriangleTable,
     /// Where those of placed meshes are; empty where nothing is placed.
     pub placements: PlacementTable,
+    /// What is exact, numbered above the triangles.
+    pub shapes: ShapeTable,
     /// Surface parameters.
     pub materials: MaterialTable,
     /// What is inside of surfaces.
@@ -65,7 +69,10 @@ impl SceneTables {
 
     /// Whether anything that rays or light samples meet moves while the shutter is open.
     pub fn moves(&self) -> bool {
-        !self.triangles.moving.is_empty() || self.placements.moves() || self.lights.moves()
+        !self.triangles.moving.is_empty()
+            || self.placements.moves()
+            || self.shapes.moves()
+            || self.lights.moves()
     }
 
     /// Whether any surface is shaded with another normal than its triangle's.

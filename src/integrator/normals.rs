@@ -112,8 +112,7 @@ pub(super) fn anisotropy_frame<L: Lanes>(
     let (mut tangent, mut bitangent) = (any.x, any.y);
     let mapped = lanes & !si.triangle.tangents.eq(L::U::splat(NONE));
     if tables.triangles.has_tangents() && mapped.any() {
-        let (given, handedness) =
-            tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1], &si.placed, &si.moved);
+        let (given, handedness) = si.tangent(tables);
         let across = given - ns.scale(ns.dot(given));
         let t = across.normalized();
         let usable = mapped & t.is_finite() & across.dot(across).gt(given.dot(given) * L::F::splat(MIN_TANGENT_SINE2));
@@ -133,8 +132,7 @@ pub(super) fn anisotropy_frame<L: Lanes>(
 fn map_normal<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, normal: V3<L>, m: V3<L>, has: L::M) -> V3<L> {
     let zero = L::F::zero();
     let flat = m.x.eq(zero) & m.y.eq(zero) & m.z.gt(zero);
-    let (tangent, handedness) =
-        tables.triangles.tangent::<L>(si.triangle.tangents, si.b[0], si.b[1], &si.placed, &si.moved);
+    let (tangent, handedness) = si.tangent(tables);
     // glTF 3.7.2.1: bitangent = cross(normal, tangent) x handedness. The tangent is used as interpolated, made unit.
     let across = tangent - normal.scale(normal.dot(tangent));
     let usable = across.dot(across).gt(tangent.dot(tangent) * L::F::splat(MIN_TANGENT_SINE2));

@@ -7,6 +7,7 @@ use crate::light::table::LightTable;
 use crate::material::Material;
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
+use crate::shape::exact::table::ShapeTable;
 use crate::shape::placement::PlacementTable;
 use crate::shape::table::{Corners, TriangleTable};
 use crate::texture::lookup::TextureTable;
@@ -53,7 +54,16 @@ impl Patch {
         triangles.push(CORNERS, Vec3::Z, 0, attributes, tangents);
         let (placements, lights) = (PlacementTable::default(), LightTable::default());
         let (media, spectrum) = (MediumTable::new(&[]), None);
-        SceneTables { triangles, placements, materials, media, spectrum, textures, lights }
+        SceneTables {
+            triangles,
+            placements,
+            shapes: ShapeTable::default(),
+            materials,
+            media,
+            spectrum,
+            textures,
+            lights,
+        }
     }
 }
 

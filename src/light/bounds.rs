@@ -74,6 +74,22 @@ impl Bounds {
         bounds
     }
 
+    /// A ball whose surface shines with `radiance` (mean over channels and the surface).
+    pub fn of_ball(centre: DVec3, radius: f64, radiance: f64, both_sides: bool) -> Self {
+        Self {
+            low: centre - radius,
+            high: centre + radius,
+            axis: DVec3::Z,
+            cos_cone: ALL,
+            both_sides,
+            flat: false,
+            strength: radiance * PI * radius * radius,
+            falloff: [0.0, 1.0],
+            exitance: PI * radiance,
+            ball: radius,
+        }
+    }
+
     /// A point light of `intensity` (mean over channels).
     pub fn of_point(position: DVec3, intensity: f64) -> Self {
         Self {

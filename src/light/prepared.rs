@@ -21,6 +21,17 @@ pub enum PreparedLight {
         /// What it is sampled as.
         shape: LampShape,
     },
+    /// A glowing sphere, exactly; its radiance is where it is hit.
+    Ball {
+        /// A little larger than it is.
+        bulb: Bulb,
+        /// Mean over channels and the surface, nits.
+        radiance: f64,
+        /// Whether it shines on both sides.
+        both_sides: bool,
+        /// Its index among all triangles.
+        primitive: u32,
+    },
     /// A point light, or a spot light about an axis.
     Point {
         /// Metres.
@@ -71,7 +82,7 @@ impl PreparedLight {
     /// Whether it is a punctual light that moves. (Surfaces are known by their triangles.)
     pub fn moves(&self) -> bool {
         match self {
-            Self::Mesh { .. } => false,
+            Self::Mesh { .. } | Self::Ball { .. } => false,
             Self::Point { later, .. } => !later.is_empty(),
             Self::Directional { later, .. } => !later.is_empty(),
         }

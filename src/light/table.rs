@@ -47,6 +47,8 @@ pub struct LightTable {
     most_ends: u32,
     emissive_meshes: usize,
     emissive_triangles: usize,
+    /// Glowing spheres that are no mesh.
+    exact_balls: usize,
     /// Surfaces that are sampled by points on them.
     has_lamps: bool,
     /// Some of them by the solid angle that they fill.
@@ -78,7 +80,7 @@ impl LightTable {
     ) -> Self {
         // Stable: surfaces, balls, points that move, other points, suns.
         lights.sort_by_key(|light| match light {
-            PreparedLight::Mesh { .. } => 0,
+            PreparedLight::Mesh { .. } | PreparedLight::Ball { .. } => 0,
             PreparedLight::Point { radius, .. } if *radius > 0.0 => 1,
             PreparedLight::Point { .. } => 3 - u8::from(light.moves()),
             PreparedLight::Directional { .. } => 4,
@@ -117,6 +119,12 @@ impl LightTable {
                 self.push_lamp(lamps, *material, shape, &triangles.moving);
                 self.emissive_meshes += 1;
                 self.emissive_triangles += lamps.len();
+            }
+            PreparedLight::Ball { bulb, primitive, .. } => {
+                triangles.set_light(*primitive as usize, self.lights.len() as u32);
+                self.push_element(0, 0, IS_BULB, element::bulb(bulb));
+                self.has_bulbs = true;
+                self.exact_balls += 1;
             }
             &PreparedLight::Point { position, intensity, cone, radius, ref later } => {
                 if radius > 0.0 {
@@ -218,7 +226,7 @@ impl LightTable {
 
     /// Some light can be hit by a ray.
     pub fn has_triangles(&self) -> bool {
-        self.emissive_triangles > 0
+        self.emissive_triangles > 0 || self.exact_balls > 0
     }
 
     /// Some light moves while the shutter is open.
@@ -401,6 +409,10 @@ fn candidates(lights: &[PreparedLight], sky: Option<Sky>, radius: f64, moving: &
                 // What moves is there once at every key, for a part of the time.
                 let part = triangles.len() as f64 / corners.len() as f64;
                 candidates.placed.push(Bounds::of_surface(&corners, *radiance, *both_sides).part(part));
+                candidates.surfaces += 1;
+            }
+            PreparedLight::Ball { bulb, radiance, both_sides, .. } => {
+                candidates.placed.push(Bounds::of_ball(bulb.centre.as_dvec3(), bulb.radius, *radiance, *both_sides));
                 candidates.surfaces += 1;
             }
             PreparedLight::Point { position, intensity, cone, radius, later } => {

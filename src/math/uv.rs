@@ -30,6 +30,16 @@ impl<L: Lanes> UvSets<L> {
         self.n = k + 1;
     }
 
+    /// These coordinates in all sets of the lanes `here`.
+    #[inline(always)]
+    pub fn replace(&mut self, here: L::M, u: L::F, v: L::F) {
+        for k in 0..MAX_UV_SETS {
+            if k < self.n {
+                self.sets[k] = [u.or_else(here, self.sets[k][0]), v.or_else(here, self.sets[k][1])];
+            }
+        }
+    }
+
     /// 0 in the lanes that are not `keep`.
     #[inline(always)]
     pub fn masked(mut self, keep: L::M) -> Self {

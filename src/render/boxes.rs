@@ -1,6 +1,6 @@
 //! Where things are: the boxes of meshes and of their instances, and which instances a mesh has.
 
-use super::moving;
+use super::{moving, shapes};
 use crate::scene::{Instance, MAX_COORDINATE, MeshId, Scene};
 use crate::shape::Mesh;
 use glam::{DMat4, DVec3, Vec3};
@@ -42,7 +42,8 @@ impl Boxes {
             *at += 1;
         }
         let mut boxes = Self { of_meshes, first, instances, scene: None };
-        boxes.scene = (0..scene.instances.len()).filter_map(|i| boxes.of_instance(scene, i)).reduce(join);
+        let of_instances = (0..scene.instances.len()).filter_map(|i| boxes.of_instance(scene, i));
+        boxes.scene = of_instances.chain(shapes::bounds(scene)).reduce(join);
         boxes
     }
 

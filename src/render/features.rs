@@ -24,5 +24,6 @@ pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)>
         ("vertex_colors", tables.triangles.has_colors()),
         ("instances", !tables.placements.is_empty()),
         ("motion", !scene.motion.is_empty()),
+        ("exact_shapes", !tables.shapes.is_empty()),
     ]
 }

@@ -134,7 +134,8 @@ pub(super) struct Flattener<'a> {
     scene: &'a Scene,
     /// Of each material, see [`mean_emissions`].
     pub emissions: Vec<[f64; 3]>,
-    opacities: Opacities,
+    /// Which of them let rays pass.
+    pub opacities: Opacities,
     /// What shading reads of the triangles so far.
     pub table: TriangleTable,
     pub totals: Totals,

@@ -1,6 +1,7 @@
 //! A camera for a scene without one: where it stands so that the whole scene is in the picture and can be recognised.
 //! The policy is stated in docs/conventions.md, "Framing".
 
+use super::shapes;
 use crate::camera::{Camera, Projection};
 use crate::scene::{Instance, Scene};
 use crate::shape::placement::cofactor;
@@ -83,7 +84,7 @@ pub(super) fn vector_area(scene: &Scene) -> DVec3 {
         // Areas go by the cofactor matrix; a mirrored mesh keeps its front.
         cofactor(linear) * meshes[mesh.index()] * if linear.determinant() < 0.0 { -1.0 } else { 1.0 }
     };
-    scene.instances.iter().map(placed).sum()
+    scene.instances.iter().map(placed).sum::<DVec3>() + shapes::vector_area(scene)
 }
 
 #[cfg(test)]

@@ -12,13 +12,14 @@ use crate::accel::geometry::{Affine, Placement};
 use crate::accel::wide::{MOST_SPLITS, may_split};
 use crate::film::blocks;
 use crate::light::{element::LampTriangle, studio};
-use crate::scene::{Instance, Scene};
+use crate::scene::{Instance, PlacedShape, Scene};
 use crate::shape::Mesh;
+use crate::shape::exact::table::PlacedShape as PlacedExact;
 use crate::shape::placement::PlacementTable;
 use crate::texture::Texels;
 use glam::Vec3;
 use serde::Serialize;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// Bytes by what they are for. A part that is not known yet is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -130,7 +131,7 @@ pub fn of_picture(settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
 /// What the picture of `scene` takes, all parts but `loading` and `left_over`. Nothing large is allocated to find out.
 pub fn estimate(scene: &Scene, settings: &RenderSettings, files: Encoded) -> MemoryEstimate {
     let mut of_picture = of_picture(settings, files);
-    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST {
+    if settings.accel == AccelChoice::Auto && scene.triangle_count() <= MOST && scene.shapes.is_empty() {
         of_picture.program -= EMBREE_LIBRARY;
     }
     let Machinery { held, building } = Machinery::of(scene, settings);
@@ -144,7 +145,14 @@ pub fn scene_bytes(scene: &Scene) -> u64 {
     let names: usize = scene.instances.iter().map(|instance| instance.name.len()).sum();
     let instances = size_of::<Instance>() * scene.instances.len() + names;
     let environment = scene.environment.as_ref().map_or(0, |e| size_of_val(&*e.radiance));
-    meshes + images + (instances + environment) as u64
+    let of_shape = |placed: &PlacedShape| size_of::<PlacedShape>() + placed.name.len() + shape_bytes(placed);
+    let shapes: usize = scene.shapes.iter().map(of_shape).sum();
+    meshes + images + (instances + environment + shapes) as u64
+}
+
+/// A shape that several places share is counted in part at each.
+fn shape_bytes(placed: &PlacedShape) -> usize {
+    placed.shape.bytes() / Arc::strong_count(&placed.shape).max(1)
 }
 
 /// What a mesh holds, bytes.
@@ -182,6 +190,8 @@ const ATTRIBUTES: u64 = 64;
 const COLORS: u64 = 48;
 const MORE_UVS: u64 = 32;
 const TANGENTS: u64 = 48;
+/// An exact shape where it is: its maps, what backends keep of it, its boxes in two trees at most.
+const SHAPE: u64 = (size_of::<PlacedExact>() + size_of::<glam::DAffine3>()) as u64 + 2 * 160;
 /// A placement in `shape::placement`.
 const PLACEMENT: u64 = PlacementTable::BYTES as u64;
 /// As it is handed to the backend, with its list of one matrix, as the allocator rounds it.
@@ -218,6 +228,14 @@ impl Machinery {
             records += n * bytes_per_triangle(mesh);
             if emits.get(mesh.material.index()) == Some(&true) {
                 lights += n;
+                choices += 1;
+            }
+        }
+        let shapes = scene.shapes.len() as u64;
+        records += shapes * (TRIANGLE + SHAPE);
+        for shape in &scene.shapes {
+            if emits.get(shape.material.index()) == Some(&true) {
+                lights += 1;
                 choices += 1;
             }
         }

@@ -17,6 +17,7 @@ mod progress;
 mod refraction;
 mod schedule;
 mod settings;
+mod shapes;
 mod stopping;
 mod tracer;
 

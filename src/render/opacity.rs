@@ -1,7 +1,7 @@
 //! Which surfaces some ray may pass: rays ask about hits on those, and on no others.
 
 use crate::material::{AlphaMode, Material};
-use crate::scene::Scene;
+use crate::scene::{MaterialId, Scene};
 use crate::shape::Mesh;
 use crate::texture::{Texels, TextureRef};
 
@@ -17,9 +17,18 @@ impl Opacities {
     /// Whether `mesh` of the same scene has a point that some ray may pass. Exporters write BLEND and MASK for much that is
     /// opaque everywhere.
     pub fn let_rays_pass(&self, scene: &Scene, mesh: &Mesh) -> bool {
-        let i = mesh.material.index();
-        let (Some(material), Some(&opacity)) = (scene.materials.get(i), self.0.get(i)) else { return false };
         let vertex = || mesh.colors.iter().flatten().fold(1.0, |least: f32, color| least.min(color[3]));
+        self.let_rays_pass_at(scene, mesh.material, vertex)
+    }
+
+    /// Whether a surface of this material without vertex colours has such a point.
+    pub fn material_lets_rays_pass(&self, scene: &Scene, material: MaterialId) -> bool {
+        self.let_rays_pass_at(scene, material, || 1.0)
+    }
+
+    fn let_rays_pass_at(&self, scene: &Scene, material: MaterialId, vertex: impl Fn() -> f32) -> bool {
+        let i = material.index();
+        let (Some(material), Some(&opacity)) = (scene.materials.get(i), self.0.get(i)) else { return false };
         match material.alpha_mode {
             AlphaMode::Opaque => false,
             AlphaMode::Mask { cutoff } => opacity * vertex() < cutoff,
@@ -52,7 +61,7 @@ fn least_texel(texels: &Texels) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{ImageId, MaterialId, TextureId};
+    use crate::scene::{ImageId, TextureId};
     use crate::texture::{Filter, Image, Param, Texture, Wrap};
 
     /// Whether rays pass a mesh of this mode, factor, texel of opacity beside one of 1, and vertex opacity.

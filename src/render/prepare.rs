@@ -5,6 +5,7 @@ use super::default_light::{DefaultLightReport, SurfaceTotals};
 use super::flatten::{Flattener, Parts};
 use super::moving;
 use super::placing::{Choice, Considered, Placing, Thing, rounded};
+use super::shapes::{self, Shapes};
 use super::{AccelChoice, AccelReport, RenderSettings, refraction};
 use crate::accel::embree::{self, EmbreeAccel};
 use crate::accel::front::{Front, Split};
@@ -112,10 +113,11 @@ fn prepare_all(
 ) -> Result<Prepared, RenderError> {
     let boxes = Boxes::of(scene);
     let placing = Placing::of(scene, &boxes, choice);
-    let count = stored_triangles(scene, &placing);
+    // A shape has a record among the triangles.
+    let count = stored_triangles(scene, &placing) + scene.shapes.len() as u64;
     // Records are gathered by signed 32-bit indices, four a triangle and seven a placement.
     if count > (i32::MAX / 4) as u64 {
-        return Err(RenderError::TooLarge(format!("{count} triangles; at most {}", i32::MAX / 4)));
+        return Err(RenderError::TooLarge(format!("{count} triangles and shapes; at most {}", i32::MAX / 4)));
     }
     if placing.placements() > (i32::MAX / 7) as usize {
         return Err(RenderError::TooLarge(format!("{} instances; at most {}", placing.placements(), i32::MAX / 7)));
@@ -152,14 +154,16 @@ fn prepare_all(
         }
         add_surface(scene, thing, &flattener.emissions, &mut flattener.totals.surface);
     }
-    let Flattener { table: mut triangles, totals, .. } = flattener;
+    let Flattener { table: mut triangles, mut totals, emissions, opacities, .. } = flattener;
     let placed = PlacedReport {
         instances: placing.placements() as u64,
         triangles: seen,
         stored: triangles.len() as u64,
         considered: placing.considered,
     };
-    let (mut warnings, mut losses) = (Vec::new(), Vec::new());
+    let shapes = Shapes::new(scene, origin, &emissions, &opacities, &mut triangles, &mut lights, &mut totals.surface);
+    geometry.world.shapes = shapes::for_rays(&shapes.table);
+    let (mut warnings, mut losses) = (shapes.warnings, Vec::new());
     if totals.without_area > 0 {
         warnings.push(format!("{} triangles have no area once placed and were dropped", totals.without_area));
     }
@@ -179,11 +183,17 @@ fn prepare_all(
     punctual(scene, origin, settings, &mut lights);
     let default_light = DefaultLightReport::decide(settings.default_light, scene, totals.surface.emitted());
     let environment = environment(scene, default_light.used);
-    if lights.is_empty() && environment.is_none() {
+    if lights.is_empty() && environment.is_none() && !shapes.glow {
         warnings.push(default_light.darkness(scene));
     }
     let media = MediumTable::new(&scene.materials);
     if media.has_thin_glass() {
+        // A ball has no triangles to fall back on: what it sends through panes is left to scattered rays.
+        let before = lights.len();
+        lights.retain(|light| !matches!(light, PreparedLight::Ball { .. }));
+        if lights.len() < before {
+            warnings.push(shapes::behind_panes(before - lights.len()));
+        }
         // Shadow rays go through it step by step, to an end that they know.
         for light in &mut lights {
             light.forget_bulb();
@@ -192,8 +202,18 @@ fn prepare_all(
     let lights = LightTable::new(lights, environment, radius, &mut triangles);
     warnings.extend(refraction::lights_that_glass_hides(scene, !lights.balls().is_empty(), !lights.suns().is_empty()));
     let spectrum = media.has_dispersion().then(Spectrum::default);
-    let tables = Arc::new(SceneTables { triangles, placements, materials, media, spectrum, textures, lights });
-    let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered);
+    let tables = Arc::new(SceneTables {
+        triangles,
+        placements,
+        shapes: shapes.table,
+        materials,
+        media,
+        spectrum,
+        textures,
+        lights,
+    });
+    let is_filtered = geometry.objects.iter().chain([&geometry.world]).flat_map(|o| &o.parts).any(|part| part.filtered)
+        || geometry.world.shapes.iter().any(|(shape, _)| shape.is_filtered());
     geometry.filter = is_filtered.then(|| Arc::new(Coverage::new(Arc::clone(&tables))) as Arc<dyn HitFilter>);
     let (accel, accel_report) = build(geometry)?;
     Ok(Prepared { tables, accel, accel_report, origin, bounds, default_light, placed, warnings, losses })

@@ -2,7 +2,7 @@
 
 use crate::light::Light;
 use crate::material::Material;
-use crate::scene::Scene;
+use crate::scene::{PlacedShape, Scene};
 
 /// Names that a warning lists at most.
 const NAMES: usize = 4;
@@ -11,7 +11,11 @@ const NAMES: usize = 4;
 /// that is bent by it never meets a point exactly. `None` where one or the other is missing. Paths find point and spot lights
 /// where those are balls (`finds_balls`), and directional lights where those are suns.
 pub(super) fn lights_that_glass_hides(scene: &Scene, finds_balls: bool, finds_suns: bool) -> Option<String> {
-    let seen = |m: &&Material| scene.instances.iter().any(|i| is_of(scene, i.mesh.index(), m));
+    let is_shape = |m: &Material| {
+        let own = |shape: &PlacedShape| scene.materials.get(shape.material.index());
+        scene.shapes.iter().any(|shape| own(shape).is_some_and(|own| std::ptr::eq(own, m)))
+    };
+    let seen = |m: &&Material| scene.instances.iter().any(|i| is_of(scene, i.mesh.index(), m)) || is_shape(m);
     let glass = scene.materials.iter().filter(|m| bends(m)).find(seen)?;
     let is_found = |light: &Light| if matches!(light, Light::Directional { .. }) { finds_suns } else { finds_balls };
     let hidden = scene.lights.iter().filter(|l| shines(&l.light) && !is_found(&l.light));

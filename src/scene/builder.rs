@@ -1,6 +1,6 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
-use super::{ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, Scene, Skipped, SourceFile, TextureId};
+use super::{ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, PlacedShape, Scene, Skipped, SourceFile, TextureId};
 use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;
@@ -64,6 +64,11 @@ impl SceneBuilder {
     /// Places a mesh.
     pub fn add_instance(&mut self, instance: Instance) {
         self.scene.instances.push(instance);
+    }
+
+    /// Places an exact shape.
+    pub fn add_shape(&mut self, shape: PlacedShape) {
+        self.scene.shapes.push(shape);
     }
 
     /// Places a light.

@@ -54,6 +54,7 @@ pub(super) fn check(scene: &mut Scene) {
         }
     }
     drop_instances(scene);
+    drop_shapes(scene);
     clean_environment(scene);
 }
 
@@ -104,7 +105,53 @@ fn drop_instances(scene: &mut Scene) {
     scene.warnings.extend(squashed.text("instances dropped: their scale squashes them to a line or a point"));
 }
 
+/// A shape squashed flatter than this, of its largest extent, has no inverse that f64 could be trusted with.
+const FLATTEST: f64 = 1e-9;
+
+/// Drops exact shapes that are squashed flat, which have no inside any more, and those that are out of every backend's
+/// range. What moves is judged where it starts.
+fn drop_shapes(scene: &mut Scene) {
+    if scene.shapes.is_empty() {
+        return;
+    }
+    let (mut flat, mut far) = (Tally::default(), Tally::default());
+    let mut kept = Vec::with_capacity(scene.shapes.len());
+    for shape in &scene.shapes {
+        let map = shape.world_from_object * shape.shape.object_from_unit();
+        let linear = DMat3::from_mat4(map);
+        let largest = [linear.x_axis, linear.y_axis, linear.z_axis].map(|c| c.length()).into_iter().fold(0.0, f64::max);
+        // Written so that NaN is refused.
+        let has_inside = (linear * (1.0 / largest)).determinant().abs() > FLATTEST.powi(2);
+        let (low, high) = shape.shape.bounds(&map);
+        let fits = low.abs().max(high.abs()).max_element() <= f64::from(MAX_COORDINATE) && largest > LEAST_SIZE;
+        flat.add(usize::from(!has_inside), &shape.name);
+        far.add(usize::from(has_inside && !fits), &shape.name);
+        kept.push(has_inside && fits);
+    }
+    if kept.iter().any(|kept| !kept) {
+        let mut keeps = kept.iter();
+        scene.shapes.retain(|_| *keeps.next().expect("one for each shape"));
+        let mut number = 0..;
+        let numbers: Vec<Option<u32>> = kept.iter().map(|kept| kept.then(|| number.next().unwrap_or(0))).collect();
+        let moving = std::mem::take(&mut scene.motion.shapes);
+        let renumbered = moving.into_iter().filter_map(|(i, keys)| Some((numbers[i as usize]?, keys)));
+        scene.motion.shapes = renumbered.collect();
+    }
+    scene.warnings.extend(flat.text("exact shapes dropped: their scale squashes them flat"));
+    if let Some(text) = far.text("exact shapes dropped: beyond 1.844e18 m, or smaller than 1e-30 m") {
+        scene.losses.push(text.clone());
+        scene.warnings.push(text);
+    }
+}
+
+/// Shapes of a smaller unit are dropped, metres.
+const LEAST_SIZE: f64 = 1e-30;
+
 fn check_ids(scene: &Scene) {
+    for shape in &scene.shapes {
+        scene.materials.get(shape.material.index()).expect("a shape's material was added to the builder");
+        assert!(shape.world_from_object.is_finite(), "world transforms are finite");
+    }
     for instance in &scene.instances {
         scene.meshes.get(instance.mesh.index()).expect("an instance's mesh was added to the builder");
         assert!(instance.world_from_object.is_finite(), "world transforms are finite");

@@ -16,8 +16,10 @@ use crate::camera::Camera;
 use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::shape::Mesh;
+use crate::shape::exact::ExactShape;
 use crate::texture::{Image, Texture};
 use glam::DMat4;
+use std::sync::Arc;
 
 /// A mesh placed in the world.
 #[derive(Clone, Debug)]
@@ -25,6 +27,19 @@ pub struct Instance {
     /// What is placed.
     pub mesh: MeshId,
     /// Object to world space, metres; any affine map, kept in f64 until the vertices are flattened.
+    pub world_from_object: DMat4,
+    /// The node's name, for messages.
+    pub name: String,
+}
+
+/// An exact shape placed in the world.
+#[derive(Clone, Debug)]
+pub struct PlacedShape {
+    /// What is placed; places share it.
+    pub shape: Arc<ExactShape>,
+    /// What its surface is made of.
+    pub material: MaterialId,
+    /// Object to world space, metres; any affine map that has an inverse.
     pub world_from_object: DMat4,
     /// The node's name, for messages.
     pub name: String,
@@ -57,6 +72,8 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Where they are.
     pub instances: Vec<Instance>,
+    /// Spheres and surfaces of revolution, where they are.
+    pub shapes: Vec<PlacedShape>,
     /// Surface descriptions.
     pub materials: Vec<Material>,
     /// Image + sampler pairs.
@@ -84,6 +101,11 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether there is nothing that a ray could meet.
+    pub fn is_empty(&self) -> bool {
+        self.shapes.is_empty() && self.triangle_count() == 0
+    }
+
     /// Triangles after placing every instance.
     pub fn triangle_count(&self) -> usize {
         self.instances.iter().map(|i| self.meshes[i.mesh.index()].indices.len()).sum()

@@ -13,6 +13,8 @@ use std::collections::BTreeMap;
 pub struct Motion {
     /// World from object space.
     pub instances: BTreeMap<u32, Vec<DMat4>>,
+    /// World from object space of exact shapes.
+    pub shapes: BTreeMap<u32, Vec<DMat4>>,
     /// Meshes that change their form.
     pub meshes: BTreeMap<u32, Vec<Pose>>,
     /// World from camera space, rigid.
@@ -35,8 +37,8 @@ pub struct Pose {
 impl Motion {
     /// Whether nothing moves.
     pub fn is_empty(&self) -> bool {
-        let Self { instances, meshes, cameras, lights } = self;
-        instances.is_empty() && meshes.is_empty() && cameras.is_empty() && lights.is_empty()
+        let Self { instances, shapes, meshes, cameras, lights } = self;
+        instances.is_empty() && shapes.is_empty() && meshes.is_empty() && cameras.is_empty() && lights.is_empty()
     }
 }
 
@@ -45,12 +47,13 @@ impl Motion {
 /// # Panics
 /// When an index, the length of a list or a transform is wrong: a bug of the loader.
 pub(super) fn clean(scene: &mut Scene) {
-    let Scene { motion, instances, meshes, cameras, lights, .. } = scene;
+    let Scene { motion, instances, shapes, meshes, cameras, lights, .. } = scene;
     let keep = |first: &DMat4, later: &[DMat4]| {
         assert!(later.iter().all(DMat4::is_finite), "world transforms are finite");
         later.iter().any(|m| m != first)
     };
     motion.instances.retain(|&i, later| keep(&instances[i as usize].world_from_object, later));
+    motion.shapes.retain(|&i, later| keep(&shapes[i as usize].world_from_object, later));
     motion.cameras.retain(|&i, later| keep(&cameras[i as usize].world_from_camera, later));
     motion.lights.retain(|&i, later| keep(&lights[i as usize].world_from_light, later));
     motion.meshes.retain(|&i, later| {

@@ -1,5 +1,6 @@
-//! Shapes: for now triangle meshes.
+//! Shapes: triangle meshes, and exact ones.
 
+pub mod exact;
 pub mod moving;
 pub mod placement;
 pub mod table;

@@ -3,6 +3,8 @@
 //! `hits` shoots rays (`rays`) at built-in meshes (`catalogue`, of `meshes`) or the user's scenes with every backend
 //! (`contenders`) and holds the answers against f64 (`oracle`); `report` has counts and limits.
 //!
+//! `shapes` holds what rays meet of turned profiles against an oracle of its own.
+//!
 //! `light` renders scenes whose pixels can be written down.
 //!
 //! `bsdf` holds what must be true of any BSDF against a function that evaluates one and a function that samples it.
@@ -17,3 +19,4 @@ pub mod meshes;
 pub mod oracle;
 pub mod rays;
 pub mod report;
+pub mod shapes;

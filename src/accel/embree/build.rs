@@ -1,6 +1,8 @@
 //! Embree scenes out of our geometry: one of the world, one of each object, all on one device.
 
-use super::super::geometry::{self, Affine, Geometry, HitFilter, Object, Part, Placement, Primitives, Shape, ShapeRay};
+use super::super::geometry::{
+    self, Affine, AtShape, Geometry, HitFilter, Object, Part, Placement, Primitives, Shape, ShapeRay,
+};
 use super::numbers::{Group, Groups, Numbers};
 use embree4_rs::{
     BuildQuality, Candidate, CommittedScene, Device, Error, Filter, InstanceArrayGeometry, InstanceGeometry, Library,
@@ -27,9 +29,11 @@ pub(super) fn build(geometry: Geometry, library: &Arc<Library>) -> Result<Built,
     let Geometry { world, objects, placements, filter } = geometry;
     let parts = || objects.iter().chain([&world]).flat_map(|object| &object.parts);
     let moves = parts().any(|part| !part.later.is_empty()) || placements.iter().any(Placement::moves);
-    let is_filtered = filter.is_some() && parts().any(|part| part.filtered);
+    let shapes = || objects.iter().chain([&world]).flat_map(|object| &object.shapes);
+    let is_filtered = parts().any(|part| part.filtered) || shapes().any(|(shape, _)| shape.is_filtered());
+    let is_filtered = filter.is_some() && is_filtered;
     // Shapes may move in ways of their own.
-    let moves = moves || objects.iter().chain([&world]).any(|object| !object.shapes.is_empty());
+    let moves = moves || shapes().next().is_some();
 
     let first = world.parts.len() + usize::from(!world.shapes.is_empty());
     let arrays = !placements.is_empty() && has_arrays(&device);
@@ -89,8 +93,10 @@ fn attach(
         numbers.push(primitives);
     }
     if !object.shapes.is_empty() {
-        let (shapes, primitives): (Vec<_>, _) = object.shapes.into_iter().unzip();
-        scene.attach(UserGeometry::new(device, Arc::new(ShapeList(shapes)))?)?;
+        let primitives = object.shapes.iter().map(|(_, primitive)| *primitive).collect();
+        let filter = filter.as_ref().map(|(filter, _)| Arc::clone(filter));
+        let list = ShapeList { shapes: object.shapes, filter };
+        scene.attach(UserGeometry::new(device, Arc::new(list))?)?;
         numbers.push(Arc::new(Primitives::Each(primitives)));
     }
     Ok(numbers)
@@ -133,29 +139,41 @@ impl Filter for PartFilter {
     }
 }
 
-/// The shapes of an object.
-struct ShapeList(Vec<Arc<dyn Shape>>);
+/// The shapes of an object, with their numbers. Those that are filtered are the world's.
+struct ShapeList {
+    shapes: Vec<(Arc<dyn Shape>, u32)>,
+    filter: Option<Arc<dyn HitFilter>>,
+}
+
+impl ShapeList {
+    #[inline(always)]
+    fn at(&self, primitive: u32, ray: &Ray) -> AtShape<'_> {
+        let (shape, primitive) = &self.shapes[primitive as usize];
+        AtShape { shape: &**shape, primitive: *primitive, instance: 0, key: ray.id, filter: self.filter.as_deref() }
+    }
+}
 
 impl UserShapes for ShapeList {
     fn len(&self) -> usize {
-        self.0.len()
+        self.shapes.len()
     }
 
     fn bounds(&self, primitive: u32, _time: f32) -> Option<[[f32; 3]; 2]> {
-        Some(self.0[primitive as usize].bounds())
+        Some(self.shapes[primitive as usize].0.bounds())
     }
 
     fn intersect(&self, primitive: u32, ray: &Ray) -> Option<UserHit> {
-        let hit = self.0[primitive as usize].intersect(&shape_ray(ray))?;
+        let hit = self.at(primitive, ray).intersect(&shape_ray(ray))?;
         Some(UserHit { t: hit.t, u: hit.u, v: hit.v })
     }
 
     fn occluded(&self, primitive: u32, ray: &Ray) -> bool {
-        self.0[primitive as usize].occludes(&shape_ray(ray))
+        self.at(primitive, ray).occludes(&shape_ray(ray))
     }
 }
 
 fn shape_ray(ray: &Ray) -> ShapeRay {
     let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
-    ShapeRay { origin, direction, t_max: ray.t_max, time: ray.time }
+    // Embree counts hits at the end.
+    ShapeRay { origin, direction, t_max: ray.t_max.next_up(), time: ray.time }
 }

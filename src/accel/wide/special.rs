@@ -1,7 +1,7 @@
 //! What is not triangles at rest: placed objects, exact shapes, things that move.
 
 use super::leaf::{Asked, Nearest};
-use crate::accel::geometry::{Affine, Placement, Shape, ShapeRay};
+use crate::accel::geometry::{Affine, AtShape, Placement, Shape, ShapeRay};
 
 /// A box of a tree that is no node and no leaf.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +55,7 @@ pub fn meet_shape(
     asked: &Asked<'_>,
     nearest: &mut Nearest,
 ) {
+    let shape = AtShape { shape, primitive, instance: asked.instance, key: asked.key, filter: asked.filter };
     if any {
         if shape.occludes(ray) {
             nearest.primitive = primitive;

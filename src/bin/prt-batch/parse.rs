@@ -332,8 +332,9 @@ pub fn bench_rounds(value: &str) -> Result<usize, String> {
 }
 
 pub fn verify() -> Words<What> {
-    const BUILT: [(&str, What); 3] = [("hits", What::Hits), ("materials", What::Materials), ("light", What::Light)];
-    Words::new(&BUILT, &["lens", "shapes", "output"])
+    const BUILT: [(&str, What); 4] =
+        [("hits", What::Hits), ("materials", What::Materials), ("light", What::Light), ("shapes", What::Shapes)];
+    Words::new(&BUILT, &["lens", "output"])
 }
 
 pub fn backend() -> Words<Backend> {

@@ -1,7 +1,7 @@
 //! What reading a file will take of memory, by its JSON and the headers of its pictures: no mesh and no pixel is read.
 
 use super::container;
-use super::outline::{Accessor, Node, Outline, Primitive, Uri};
+use super::outline::{Accessor, Node, Outline, Primitive, Shape, Uri};
 use super::slots::{needs_tangents, reads};
 use super::uri::percent_decode;
 use crate::image::decode::{MAX_PIXELS, MAX_SIDE};
@@ -9,7 +9,7 @@ use crate::image::header::{Header, header};
 use crate::load::LoadOptions;
 use crate::load::estimate::{LoadEstimate, Picture, pictures};
 use crate::load::folders::Folders;
-use crate::scene::Instance;
+use crate::scene::{Instance, PlacedShape};
 use crate::texture::Channels;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -100,18 +100,37 @@ impl Survey<'_> {
     }
 
     fn node(&mut self, node: &Node) -> Option<()> {
-        let Some(index) = node.mesh else { return Some(()) };
-        let mesh = self.outline.meshes.get(index)?;
         let copies = match &node.extensions.instancing {
             None => 1,
             Some(instancing) => self.accessor(*instancing.attributes.values().next()?)?.count,
         };
+        if let Some(shape) = &node.extensions.shape {
+            return self.shape(shape, copies);
+        }
+        let Some(index) = node.mesh else { return Some(()) };
+        let mesh = self.outline.meshes.get(index)?;
         let placed = copies.saturating_mul((size_of::<Instance>() as u64 + NAME) * mesh.primitives.len() as u64);
         self.reached.kept = self.reached.kept.saturating_add(placed);
         let pose = (index, node.skin, node.weights.iter().map(|w| w.to_bits()).collect());
         if self.reached.meshes.insert(pose) {
             for primitive in &mesh.primitives {
                 self.primitive(primitive, node)?;
+            }
+        }
+        Some(())
+    }
+
+    /// An exact shape in place of a mesh.
+    fn shape(&mut self, shape: &Shape, copies: u64) -> Option<()> {
+        let placed = copies.saturating_mul(size_of::<PlacedShape>() as u64 + NAME);
+        // A segment has three points, and eight pieces with their boxes.
+        let segments = shape.points.len() as u64 * 8 * 128;
+        self.reached.kept = self.reached.kept.saturating_add(placed).saturating_add(segments);
+        let Some(material) = shape.material else { return Some(()) };
+        let material = self.outline.materials.get(material)?;
+        for (read, channels) in reads(material) {
+            if let Some(image) = self.outline.textures.get(read.index)?.image() {
+                *self.reached.images.entry(image).or_insert(Channels::NONE) |= channels;
             }
         }
         Some(())

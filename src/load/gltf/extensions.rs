@@ -26,6 +26,7 @@ const READ: &[&str] = &[
     "KHR_mesh_quantization",
     "KHR_node_visibility",
     "KHR_texture_transform",
+    "PRT_shape",
 ];
 
 /// Without effect on a picture of the file as it is written.
@@ -57,7 +58,6 @@ const COMPRESSIONS: &[&str] = &["EXT_meshopt_compression", "KHR_draco_mesh_compr
 const LOSSES: &[(&str, &str)] = &[
     ("EXT_lights_ies", "lights shine as if they had no profile"),
     ("EXT_lights_image_based", "its environment gives no light"),
-    ("PRT_shape", "the mesh is drawn instead"),
 ];
 
 /// Refuses what the file requires and we do not read.

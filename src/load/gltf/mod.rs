@@ -24,6 +24,7 @@ mod node;
 mod outline;
 mod primitive;
 mod semantic;
+mod shape;
 mod skin;
 mod slots;
 mod texture;

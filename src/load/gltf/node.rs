@@ -2,7 +2,7 @@
 
 use super::check::children;
 use super::locate::shorten;
-use super::{Document, Loader, Result, camera, extensions, instancing, light, mesh, name_or};
+use super::{Document, Loader, Result, camera, extensions, instancing, light, mesh, name_or, shape};
 use crate::scene::Instance;
 use glam::{DMat4, DQuat, DVec3};
 use gltf::json::Index;
@@ -182,7 +182,11 @@ fn place(loader: &mut Loader, node: &Node, i: usize, Above { world, visible }: A
     if let Some(carried) = &node.extensions {
         extensions::note_carried(doc, carried.others.keys(), &at, &[]);
     }
-    if let Some(index) = node.mesh
+    if let Some(found) = shape::of(node) {
+        if visible {
+            shape::place(loader, node, i, found, world)?;
+        }
+    } else if let Some(index) = node.mesh
         && visible
     {
         place_mesh(loader, node, index, &at, world, name())?;

@@ -14,6 +14,8 @@ pub enum What {
     Materials,
     /// What pixels show.
     Light,
+    /// Where rays meet exact shapes.
+    Shapes,
 }
 
 impl What {
@@ -23,6 +25,7 @@ impl What {
             Self::Hits => "hits",
             Self::Materials => "materials",
             Self::Light => "light",
+            Self::Shapes => "shapes",
         }
     }
 }
@@ -31,7 +34,7 @@ impl What {
 pub struct VerifyArgs {
     /// What is verified
     ///
-    /// hits: what rays hit, by every backend against f64. materials: energy, sampling and reciprocity of what they reflect. light: built-in scenes whose pixels can be written down.
+    /// hits: what rays hit, by every backend against f64. materials: energy, sampling and reciprocity of what they reflect. light: built-in scenes whose pixels can be written down. shapes: whether rays find every crossing with surfaces of revolution.
     #[arg(value_name = "WHAT", default_value = "hits", value_parser = parse::verify())]
     pub what: What,
     /// .gltf, .glb and .obj files, or folders of them [default: the built-in meshes or materials]
@@ -39,13 +42,13 @@ pub struct VerifyArgs {
     /// Of each its default scene; of that all materials.
     #[arg(value_name = "INPUT", value_hint = ValueHint::AnyPath)]
     pub inputs: Vec<PathBuf>,
-    /// hits: rays of each kind at each mesh or scene [default: 5000]
+    /// hits: rays of each kind at each mesh or scene; shapes: rays at each profile [default: 5000]
     #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub rays: Option<usize>,
     /// materials: samples of each chi-square test; light: samples of a pixel [default: 100000 and 1024]
     #[arg(long, value_name = "N", value_parser = parse::samples)]
     pub samples: Option<usize>,
-    /// materials: random ones besides the built-in grid [default: 0]
+    /// materials, shapes: random ones besides the built-in ones [default: 0 materials, 100 shapes]
     #[arg(long, value_name = "N", value_parser = parse::rays)]
     pub random: Option<usize>,
     /// Other seeds, other rays and samples

@@ -10,3 +10,4 @@ pub mod retone;
 pub mod verify;
 mod verify_light;
 mod verify_materials;
+mod verify_shapes;

@@ -24,6 +24,7 @@ pub fn run(args: &VerifyArgs) -> ExitCode {
         What::Hits => [("samples", args.samples.is_some()), ("random", args.random.is_some())],
         What::Materials => [("rays", args.rays.is_some()), ("accel", !args.accel.is_empty())],
         What::Light => [("rays", args.rays.is_some()), ("random", args.random.is_some())],
+        What::Shapes => [("samples", args.samples.is_some()), ("accel", !args.accel.is_empty())],
     };
     if let Some((name, _)) = refused.iter().find(|(_, is_given)| *is_given) {
         return term::usage(&format!("--{name} means nothing to verify {}; leave it out", args.what.name()));
@@ -32,6 +33,7 @@ pub fn run(args: &VerifyArgs) -> ExitCode {
         What::Hits => hits_of(args),
         What::Materials => super::verify_materials::run(args),
         What::Light => super::verify_light::run(args),
+        What::Shapes => super::verify_shapes::run(args),
     }
 }
 

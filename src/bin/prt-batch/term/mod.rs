@@ -14,6 +14,7 @@ mod plain;
 mod repeats;
 mod reporter;
 mod screen;
+pub mod shapes_table;
 mod style;
 mod table;
 mod text;
