@@ -69,10 +69,7 @@ impl SceneTables {
 
     /// Whether anything that rays or light samples meet moves while the shutter is open.
     pub fn moves(&self) -> bool {
-        !self.triangles.moving.is_empty()
-            || self.placements.moves()
-            || self.shapes.moves()
-            || self.lights.moves()
+        !self.triangles.moving.is_empty() || self.placements.moves() || self.shapes.moves() || self.lights.moves()
     }
 
     /// Whether any surface is shaded with another normal than its triangle's.

@@ -1,6 +1,8 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
-use super::{ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, PlacedShape, Scene, Skipped, SourceFile, TextureId};
+use super::{
+    ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, PlacedShape, Scene, Skipped, SourceFile, TextureId,
+};
 use crate::camera::Camera;
 use crate::light::Environment;
 use crate::material::Material;

@@ -31,7 +31,7 @@ fn table(corners: [Numbers; 3]) -> TriangleTable {
 fn read<L: Lanes>(table: &TriangleTable, u: f32, v: f32) -> Numbers {
     let (index, u, v) = (L::U::splat(0), L::F::splat(u), L::F::splat(v));
     let a = table.attributes::<L>(index, u, v);
-    let (t, _) = table.tangent::<L>(index, u, v, &None);
+    let (t, _) = table.tangent::<L>(index, u, v, &None, &None);
     let (n, c) = (a.normal, a.color);
     let mut out = [0.0; NUMBERS];
     store::<L>(&[n.x, n.y, n.z, t.x, t.y, t.z, c.x, c.y, c.z, a.opacity], &mut out[..10]);

@@ -110,7 +110,7 @@ pub fn read_placed(prepared: &Prepared, points: &[(u32, u32, f32, f32)]) -> Vec<
                 let all = L::M::first(L::N);
                 let placed = match tables.placements.is_empty() {
                     true => None,
-                    false => tables.placements.get::<L>(L::U::splat(instance), all),
+                    false => tables.placements.get::<L>(L::U::splat(instance), L::F::zero(), all),
                 };
                 let (triangle, p, offset) = stored.placed(&placed, stored.point(u, v));
                 let ng = vector(triangle.ng);
