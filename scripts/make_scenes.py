@@ -12,10 +12,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from scene_kit import forest, lights, objects, rooms, surfaces
+from scene_kit import forest, lights, objects, rooms, seed, surfaces
 
 SCENES = (rooms.cornell, rooms.wall, rooms.knot, lights.lights, lights.punctual, objects.metals, objects.stilllife,
-          forest.forest)
+          forest.forest, seed.seed)
 # Written into the folder surfaces/.
 SURFACES = (surfaces.brushed, surfaces.lacquer, surfaces.cloth_scene, surfaces.frosted, surfaces.gloss)
 FOLDER = Path(__file__).resolve().parent.parent / "scenes"

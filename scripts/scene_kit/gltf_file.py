@@ -192,6 +192,22 @@ class GltfFile:
         rotation = None if target is None else aim(at, target, up)
         return self.node(name, at=at, turn=rotation, extensions={"KHR_lights_punctual": {"light": len(self.lights) - 1}})
 
+    def animation(self, name, node, path, times, values, tangents=None):
+        """Moves `node`: LINEAR, or CUBICSPLINE with an (in, out) pair of `tangents` a key."""
+        rows = list(values)
+        if tangents:
+            rows = [row for value, (into, out) in zip(values, tangents) for row in (into, value, out)]
+        width = len(rows[0])
+
+        def accessor(rows, kind, **more):
+            data = struct.pack(f"<{len(rows) * len(rows[0])}f", *(x for row in rows for x in tidy(row)))
+            return self._put("accessors", {"bufferView": self._view(data), "componentType": 5126, "count": len(rows), "type": kind, **more})
+
+        keys = accessor([(t,) for t in times], "SCALAR", min=[f32(min(times))], max=[f32(max(times))])
+        sampler = {"input": keys, "output": accessor(rows, TYPES[width]), "interpolation": "CUBICSPLINE" if tangents else "LINEAR"}
+        target = {"node": node, "path": path}
+        return self._put("animations", {"name": name, "samplers": [sampler], "channels": [{"sampler": 0, "target": target}]})
+
     def files(self):
         self.blob.extend(b"\0" * (-len(self.blob) % 4))
         buffer = {"byteLength": len(self.blob)}
