@@ -186,7 +186,7 @@ impl ExactShape {
 #[inline(always)]
 fn cross_sphere(line: &Line, visit: &mut impl Visit) {
     let square = 1.0 - line.o.length_squared();
-    if !(square > 0.0) {
+    if square <= 0.0 {
         return;
     }
     let half = square.sqrt();
