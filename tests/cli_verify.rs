@@ -83,7 +83,7 @@ fn materials_of_a_scene_pass_and_random_ones_are_for_the_built_in_ones() {
 fn shapes_pass_and_take_no_inputs() {
     let (code, stdout, stderr) = verify(&["shapes", "--rays", "200", "--random", "10", "--seed", "2"]);
     assert!(code == 0 && stdout.contains("bottle") && stdout.contains("passed"), "{code} {stdout}{stderr}");
-    let (code, stdout, _) = verify(&["shapes", "--rays", "100", "--random", "0", "--json"]);
+    let (code, stdout, _) = verify(&["shapes", "--rays", "100", "--random", "1", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
     assert!(code == 0 && report["passed"] == true && report["profiles"][0]["missed"] == 0, "{stdout}");
     let (code, _, stderr) = verify(&["shapes", &scene()]);

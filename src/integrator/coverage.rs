@@ -48,13 +48,17 @@ impl Kernel for Stops<'_> {
             let a = tables.triangles.attributes::<L>(triangle.attributes, L::F::splat(u), L::F::splat(v));
             (uvs, vertex_opacity) = (a.uvs, a.opacity);
         }
+        let mut which = primitive;
         if tables.shapes.get(self.candidate.primitive).is_some() {
+            // A ray may cross a shape several times, each time by another chance: what tells its crossings apart is where
+            // they are, and that has the same bits whoever asks.
+            which = L::U::splat(self.candidate.primitive ^ u.to_bits().wrapping_mul(0x9e37_79b9) ^ v.to_bits());
             let [u, v] = texture_coordinates(u, v);
             uvs = UvSets::single(L::F::splat(u), L::F::splat(v));
         }
         let all = L::M::first(L::N);
         let coverage = tables.materials.coverage::<L>(&tables.textures, triangle.material, &uvs, vertex_opacity, all);
-        !coverage.le(coverage_number::<L>(L::U::splat(key), L::U::splat(instance), primitive)).any()
+        !coverage.le(coverage_number::<L>(L::U::splat(key), L::U::splat(instance), which)).any()
     }
 }
 

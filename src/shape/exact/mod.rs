@@ -138,7 +138,7 @@ impl ExactShape {
         (centre + low, centre + high)
     }
 
-    /// Square metres where `linear` puts its units.
+    /// Square metres where `linear` puts its units, to a hundredth.
     pub fn area(&self, linear: DMat3) -> f64 {
         let stretch = linear.x_axis.length();
         let is_uniform = [linear.y_axis, linear.z_axis].iter().all(|c| (c.length() - stretch).abs() <= 1e-9 * stretch)
@@ -148,8 +148,8 @@ impl ExactShape {
             return 4.0 * PI * stretch * stretch;
         }
         let (rows, columns) = match self {
-            Self::Sphere { .. } => (64, 32),
-            Self::Revolution(r) => (4 * r.profile().pieces.len(), if is_uniform { 1 } else { 32 }),
+            Self::Sphere { .. } => (32, 16),
+            Self::Revolution(r) => (2 * r.profile().pieces.len(), if is_uniform { 1 } else { 12 }),
         };
         let mut sum = 0.0;
         for row in 0..rows {
@@ -186,7 +186,7 @@ impl ExactShape {
 #[inline(always)]
 fn cross_sphere(line: &Line, visit: &mut impl Visit) {
     let square = 1.0 - line.o.length_squared();
-    if !(square > 0.0) {
+    if square <= 0.0 {
         return;
     }
     let half = square.sqrt();

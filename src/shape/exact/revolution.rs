@@ -97,8 +97,7 @@ impl Revolution {
         let (o, d) = (line.o, line.d);
         // The corners of the box of radius and height 1 are this far.
         let reach2 = 2.0 + SLACK - o.length_squared();
-        // Written so that NaN is refused.
-        if !(reach2 > 0.0) {
+        if reach2 <= 0.0 {
             return;
         }
         let reach = reach2.sqrt();
@@ -184,8 +183,7 @@ impl<V: Visit> Search<'_, V> {
             low = low.max(t0.min(t1));
             high = high.min(t0.max(t1));
         }
-        // Written so that NaN is refused.
-        if !(low <= high) {
+        if low > high {
             return false;
         }
         let square = |t: f64| (a * t + 2.0 * b) * t + c;
@@ -277,11 +275,9 @@ impl<V: Visit> Search<'_, V> {
         let width = [part.width * s, part.width * (1.0 - s)];
         let left = Part { r: r0, a: a0, from: part.from, width: width[0] };
         let right = Part { r: r1, a: a1, from: part.from + width[0], width: width[1] };
-        if (part.a[3] - part.a[0]) * self.ray.dy >= 0.0 {
-            self.part(&left, depth - 1) || self.part(&right, depth - 1)
-        } else {
-            self.part(&right, depth - 1) || self.part(&left, depth - 1)
-        }
+        let rises = (part.a[3] - part.a[0]) * self.ray.dy >= 0.0;
+        let [first, second] = if rises { [&left, &right] } else { [&right, &left] };
+        self.part(first, depth - 1) || self.part(second, depth - 1)
     }
 
     /// A level line in the heights of a part; whether that is enough.

@@ -182,6 +182,21 @@ fn sor_01_lines_in_the_surface_and_tangent_lines_end() {
     assert!(most < 2000, "{most}");
 }
 
+#[test]
+fn sor_01_short_chords_near_the_rim_are_found() {
+    let ball = revolution(&[[0.0, -1.0], [1.5, -1.0], [1.5, 1.0], [0.0, 1.0]]);
+    for k in 2..12 {
+        let e = 10f64.powi(-k);
+        for rise in [0.0, 1e-7, 1e-3, 0.3] {
+            // Through the inside of the equator, whose radius is 9/8, e deep.
+            let d = DVec3::new(0.0, rise, 1.0);
+            let found = crossings(&ball, DVec3::new(1.125 - e, 0.0, 0.0) - 3.0 * d, d).found;
+            let [a, b] = found[..] else { panic!("{e:e} {rise:e}: {found:?}") };
+            assert!(a < 3.0 && b > 3.0 && b - a < 4.0 * e.sqrt(), "{e:e} {rise:e}: {found:?}");
+        }
+    }
+}
+
 // A closed surface is crossed an even number of times, whatever the line: seed 2.
 #[test]
 fn crossings_of_a_closed_surface_come_in_pairs() {

@@ -83,6 +83,9 @@ fn sor_05_rays_that_leave_a_shape_do_not_meet_it_where_they_left_it() {
             }
             assert_eq!(again, 0, "shape {k}, scale {scale:e}, {shift:e} away");
             let point = placed.point(0.37, 0.21, 0.0);
+            // Rounding the point, and what is added to it.
+            let rounding = 2f32.powi(-23) * point.p.abs().max_element() * point.ng.abs().element_sum();
+            assert!(point.offset >= 2.0 * rounding, "the offset {} is hardly more than {rounding}", point.offset);
             let bound = 64.0 * 2f32.powi(-24) * (point.p.abs().max_element() + 2.0 * scale as f32);
             assert!(point.offset <= bound, "the offset {} is larger than {bound}", point.offset);
         }

@@ -99,7 +99,7 @@ pub fn named() -> Vec<Subject> {
 pub fn random(k: u64) -> Subject {
     let mut rng = Rng::of_stream(1234, "profiles", k);
     let mut point = || [f64::from(rng.range(-0.3, 1.2)), f64::from(rng.range(-1.0, 1.0))];
-    let curve = if k % 2 == 0 { Curve::Bezier } else { Curve::BSpline };
+    let curve = if k.is_multiple_of(2) { Curve::Bezier } else { Curve::BSpline };
     let points = match curve {
         Curve::Bezier => (0..3 * (k / 2 % 4 + 1) + 1).map(|_| point()).collect(),
         Curve::BSpline => (0..k / 2 % 6 + 4).map(|_| point()).collect(),
