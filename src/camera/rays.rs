@@ -1,14 +1,15 @@
 //! Camera rays over N lanes.
 
-use super::{Camera, Projection};
+use super::aperture::Aperture;
+use super::{Camera, Projection, ThinLens};
 use crate::math::V3;
 use glam::{DMat4, DVec3};
 use simd::{Float, Lanes};
 
-/// A pinhole or orthographic camera for one picture size, in the prepared scene's space.
+/// A pinhole, a thin lens or an orthographic camera for one picture size, in the prepared scene's space.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraRays {
-    /// The pinhole, or the centre of the plane where parallel rays start; metres.
+    /// The pinhole, the centre of the lens, or that of the plane where parallel rays start; metres.
     origin: [f32; 3],
     /// Direction through the picture's centre.
     forward: [f32; 3],
@@ -22,12 +23,15 @@ pub struct CameraRays {
     per_pixel: [f32; 2],
     /// Rays start on the plane instead of at a point.
     is_parallel: bool,
+    /// Rays start on a lens.
+    aperture: Option<Aperture>,
 }
 
 impl CameraRays {
     /// A camera for a picture of `width` x `height` pixels in a scene recentred on `origin` (f64, world metres). The
-    /// vertical field of view (or height) is kept; the horizontal one follows from the picture's shape.
-    pub fn new(camera: &Camera, width: u32, height: u32, origin: DVec3) -> Self {
+    /// vertical field of view (or height) is kept; the horizontal one follows from the picture's shape. Rays start on
+    /// `lens`, if there is one; an orthographic camera has none.
+    pub fn new(camera: &Camera, width: u32, height: u32, origin: DVec3, lens: Option<&ThinLens>) -> Self {
         let (half_height, is_parallel) = match camera.projection {
             Projection::Perspective { yfov, .. } => ((0.5 * yfov).tan(), false),
             Projection::Orthographic { ymag, .. } => (ymag, true),
@@ -43,12 +47,14 @@ impl CameraRays {
             pixel: (2.0 * half_height / f64::from(height)) as f32,
             per_pixel: [(2.0 / f64::from(width)) as f32, (2.0 / f64::from(height)) as f32],
             is_parallel,
+            aperture: lens.map(|lens| Aperture::new(lens, [half_height * aspect, half_height])),
         }
     }
 
-    /// Origin and unit direction of the rays through film points (`x`, `y`), pixels from the top left corner.
+    /// Origin and unit direction of the rays through film points (`x`, `y`), pixels from the top left corner; `lens`, in
+    /// the unit square, says where on the lens they start, if there is one.
     #[inline(always)]
-    pub fn ray<L: Lanes>(&self, x: L::F, y: L::F) -> (V3<L>, V3<L>) {
+    pub fn ray<L: Lanes>(&self, x: L::F, y: L::F, lens: [L::F; 2]) -> (V3<L>, V3<L>) {
         let one = L::F::one();
         let sx = x.mul_add(L::F::splat(self.per_pixel[0]), -one);
         let sy = y.mul_add(L::F::splat(self.per_pixel[1]), -one);
@@ -59,6 +65,8 @@ impl CameraRays {
             return (right.mul_add(sx, down.mul_add(sy, origin)), forward);
         }
         let d = right.mul_add(sx, down.mul_add(sy, forward));
+        let Some(aperture) = &self.aperture else { return (origin, d.normalized()) };
+        let (origin, d) = aperture.ray(origin, d, [right, down], lens);
         (origin, d.normalized())
     }
 

@@ -2,8 +2,8 @@
 
 use super::framing::{framing_camera, vector_area};
 use super::{CropWindow, Prepared, RenderSettings};
-use crate::camera::{Camera, CameraRays, PixelFilter};
-use crate::integrator::PathTracer;
+use crate::camera::{Camera, CameraRays, PixelFilter, ThinLens};
+use crate::integrator::{Integrator, PathTracer};
 use crate::scene::Scene;
 use simd::Level;
 use std::borrow::Cow;
@@ -26,11 +26,16 @@ pub fn window(settings: &RenderSettings) -> CropWindow {
     settings.crop.unwrap_or(CropWindow { x: 0, y: 0, width: settings.width, height: settings.height })
 }
 
-/// The tracer of a picture.
+/// The tracer of a picture, taken through `lens` (see [`super::lens()`]).
 ///
 /// # Panics
 /// When `settings.lanes` is none of 1, 8, 16.
-pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSettings) -> PathTracer<'p> {
+pub fn tracer<'p>(
+    prepared: &'p Prepared,
+    camera: &Camera,
+    lens: Option<&ThinLens>,
+    settings: &RenderSettings,
+) -> PathTracer<'p> {
     let level = match settings.lanes {
         None => Level::best(),
         Some(1) => Level::Scalar,
@@ -39,12 +44,15 @@ pub fn tracer<'p>(prepared: &'p Prepared, camera: &Camera, settings: &RenderSett
         Some(n) => panic!("{n} lanes; allowed: 1, 8, 16"),
     }
     .without_portable();
+    let is_whitted = settings.integrator == Integrator::Whitted;
     PathTracer {
         tables: &prepared.tables,
         accel: &*prepared.accel,
-        camera: CameraRays::new(camera, settings.width, settings.height, prepared.origin),
+        lamps: if is_whitted { prepared.tables.lights.fixed_points() } else { Vec::new() },
+        camera: CameraRays::new(camera, settings.width, settings.height, prepared.origin, lens),
         filter: PixelFilter::new(settings.filter.shape, settings.filter.width),
-        max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
+        integrator: settings.integrator,
+        max_bounces: settings.max_bounces.unwrap_or(settings.bounce_cap()),
         is_capped: settings.max_bounces.is_none(),
         cull_backfaces: settings.cull_backfaces,
         clamp: settings.clamp,
