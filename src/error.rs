@@ -72,6 +72,8 @@ pub enum RenderError {
     AccelUnavailable(String),
     /// The scene is larger than an index type allows, or than memory.
     TooLarge(String),
+    /// The camera has no such lens; the text says why, and what is allowed.
+    Lens(String),
     /// The caller asked for it.
     Interrupted,
 }
@@ -79,7 +81,7 @@ pub enum RenderError {
 impl fmt::Display for RenderError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::AccelUnavailable(why) => write!(f, "{why}"),
+            Self::AccelUnavailable(why) | Self::Lens(why) => write!(f, "{why}"),
             Self::TooLarge(what) => write!(f, "scene too large: {what}"),
             Self::Interrupted => write!(f, "interrupted"),
         }

@@ -3,7 +3,7 @@
 mod support;
 
 use glam::{DMat4, DQuat, DVec3};
-use prt::camera::{Camera, Projection, look_at};
+use prt::camera::{Camera, Lens, Projection, look_at};
 use prt::image::exr::{ExrCamera, ExrOptions, ExrPicture, ExrProjection, encode};
 use prt::material::Material;
 use prt::render::{AccelChoice, Filter, FilterShape, Frame, Progress, RenderSettings, render};
@@ -34,7 +34,7 @@ fn scene(projection: Projection, at: DVec3, half: f64) -> Scene {
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         .map(|(x, y)| world.transform_point3(at + half * DVec3::new(x, y, 0.0)).as_vec3().to_array());
     add_quad(&mut builder, corners, material);
-    builder.add_camera(Camera { name: String::new(), world_from_camera: world, projection });
+    builder.add_camera(Camera { name: String::new(), world_from_camera: world, projection, lens: Lens::default() });
     builder.finish()
 }
 
@@ -76,6 +76,7 @@ fn by_exr(frame: &Frame, p: DVec3) -> (f64, f64) {
         pixels: &frame.pixels,
         channels: Vec::new(),
         camera,
+        lens: None,
         attributes: Vec::new(),
     };
     let bytes = encode(&picture, ExrOptions::default()).expect("a whole picture");

@@ -25,6 +25,7 @@ fn write(path: &Path, origin: [u32; 2], size: [u32; 2], value: impl Fn(u32, u32)
         pixels: &pixels,
         channels: Vec::new(),
         camera,
+        lens: None,
         attributes: Vec::new(),
     };
     std::fs::create_dir_all(path.parent().unwrap()).unwrap();

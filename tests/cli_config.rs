@@ -128,6 +128,10 @@ fn every_option_can_stand_in_a_config() {
         spp = 0x2
         seed = 18446744073709551615
         integrator = "path"
+        f-stop = 2.8
+        focus-distance = 3
+        aperture-blades = 6
+        sensor = 24.0
         max-bounces = 3
         brdf = "appendix-b"
         filter = "box:1"

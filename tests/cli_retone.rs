@@ -50,6 +50,7 @@ fn exr(pixels: &[[f32; 3]]) -> Vec<u8> {
         pixels,
         channels: Vec::new(),
         camera,
+        lens: None,
         attributes: Vec::new(),
     };
     encode(&picture, ExrOptions::default()).unwrap()

@@ -8,7 +8,7 @@
 mod support;
 
 use glam::{DMat4, DVec3};
-use prt::camera::{Camera, Projection};
+use prt::camera::{Camera, Lens, Projection};
 use prt::light::Light;
 use prt::material::{AlphaMode, Material};
 use prt::render::{AccelChoice, DefaultLight, RenderSettings, geometry};
@@ -227,7 +227,8 @@ fn passing_a_surface_is_no_bounce() {
 /// Looks straight down at the origin from height `y`, +z at the lower edge.
 fn camera_above(y: f64, yfov: f64) -> Camera {
     let world_from_camera = DMat4::from_translation(DVec3::Y * y) * DMat4::from_rotation_x(-PI / 2.0);
-    Camera { name: "above".into(), world_from_camera, projection: Projection::Perspective { yfov, aspect_ratio: None } }
+    let projection = Projection::Perspective { yfov, aspect_ratio: None };
+    Camera { name: "above".into(), world_from_camera, projection, lens: Lens::default() }
 }
 
 /// Blended sheets of several opacities and a mask of many holes over a floor under a lamp and the sun, seen whole.

@@ -8,7 +8,7 @@ mod rng;
 
 use glam::{DMat4, DVec3, Vec3};
 use prepared::{mesh, one_instance, prepared, read, scene_of, trace};
-use prt::camera::{Camera, Projection};
+use prt::camera::{Camera, Lens, Projection};
 use prt::material::Material;
 use prt::render::{AccelChoice, Frame, Progress, RenderSettings, render};
 use prt::scene::Scene;
@@ -57,6 +57,7 @@ fn picture(scene: &mut Scene) -> Frame {
         name: String::new(),
         world_from_camera: DMat4::from_translation(DVec3::Z * 4.0),
         projection: Projection::Perspective { yfov: 0.7, aspect_ratio: None },
+        lens: Lens::default(),
     }];
     settings_render(scene)
 }

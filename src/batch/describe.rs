@@ -3,7 +3,7 @@
 use super::report::{self, Accel, ImageReport, Rays};
 use super::settings::FileSettings;
 use crate::film::{ErrorEstimate, Square};
-use crate::render::{AccelChoice, DefaultLight, Frame, SpreadReport, StoppedBy, TargetReport};
+use crate::render::{AccelChoice, DefaultLight, Frame, Integrator, LensReport, SpreadReport, StoppedBy, TargetReport};
 use std::path::Path;
 
 /// The report of an image of which nothing is known but what was asked for.
@@ -13,6 +13,7 @@ pub(super) fn blank(input: &Path, settings: &FileSettings) -> ImageReport {
         input: input.display().to_string(),
         spp: render.spp,
         seed: render.seed,
+        integrator: Some(render.integrator.name().into()),
         accel: Accel { requested: accel_name(render.accel).into(), ..Accel::default() },
         ..ImageReport::default()
     }
@@ -67,13 +68,61 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
         emitted_lm_per_m2: stats.default_light.emitted.by_lamps,
         glowing_share: stats.default_light.emitted.glowing,
     });
+    image.lens = stats.lens.map(Into::into);
     image.notes.extend(stats.default_light.note());
     if stats.energy_clamped > 0.0 {
         image.notes.push(format!("--clamp took {} of the light", report::percent(stats.energy_clamped)));
     }
+    if image.integrator.as_deref() == Some(Integrator::Ao.name()) && frame.pixels.iter().all(|pixel| pixel[0] == 0.0) {
+        image.notes.push(
+            "--integrator ao: nothing is open: the scene is closed on all sides, and what is there counts at any distance"
+                .into(),
+        );
+    }
+    let has = |name| stats.features.iter().any(|feature| *feature == (name, true));
+    if image.integrator.as_deref() == Some(Integrator::Whitted.name())
+        && (has("emissive_surfaces") || has("environment"))
+    {
+        image.notes.push(
+            "--integrator whitted: lamps are points, the surroundings 16 directions; their shadows are hard".into(),
+        );
+    }
     image.features = stats.features.iter().map(|&(name, has)| (name.into(), has)).collect();
     image.warnings.extend(stats.warnings.iter().cloned());
     image.losses.extend(stats.losses.iter().cloned());
+}
+
+/// What to say of a lens that was focused by itself, and of options that do nothing without one.
+pub(super) fn lens_notes(settings: &FileSettings, lens: Option<&LensReport>) -> Option<String> {
+    const OTHERWISE: &str = "--focus-distance M and --focus-on NODE say otherwise";
+    match lens {
+        Some(LensReport { thin, is_found: true }) if thin.focus_distance.is_finite() => Some(format!(
+            "the lens is focused at {:.4} m, on the first surface in the picture's centre; {OTHERWISE}",
+            thin.focus_distance
+        )),
+        Some(LensReport { is_found: true, .. }) => {
+            Some(format!("the lens is focused at infinity: nothing is in the picture's centre; {OTHERWISE}"))
+        }
+        Some(_) => None,
+        None => {
+            let lens = &settings.render.lens;
+            let idle = [
+                ("--focus-distance", lens.focus_distance.is_some()),
+                ("--focus-on", settings.load.focus_on.is_some()),
+                ("--aperture-blades", lens.blades.is_some()),
+                ("--sensor", lens.sensor.is_some()),
+            ];
+            let (option, _) = idle.into_iter().find(|(_, is_given)| *is_given && !is_pinhole_by_wish(settings))?;
+            Some(format!(
+                "{option} does nothing: neither the camera nor --f-stop gives an f-number, so it is a pinhole"
+            ))
+        }
+    }
+}
+
+/// `--f-stop inf`.
+fn is_pinhole_by_wish(settings: &FileSettings) -> bool {
+    settings.render.lens.f_stop.is_some_and(f64::is_infinite)
 }
 
 /// What is said where the target was not reached, or there was nothing to tell by.

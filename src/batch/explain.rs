@@ -2,13 +2,13 @@
 //! and prepared, and a tenth of a second of paths is traced to tell how long the rest will take.
 
 use super::content::HashCache;
-use super::describe::{accel_name, default_light_name};
+use super::describe::{accel_name, default_light_name, lens_notes};
 use super::elsewhere::Elsewhere;
 use super::fingerprint::StoppingRecord;
 use super::job::Plan;
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
-use super::report::{Accel, DefaultLight, Outputs};
+use super::report::{Accel, DefaultLight, Lens, Outputs};
 use super::run::{Stop, names_of, planned, reported_name};
 use super::settings::{BatchSettings, FileSettings};
 use super::size::{aspect_note, check_crop, size_for};
@@ -52,6 +52,8 @@ pub struct Explanation {
     pub up_to_date: Option<String>,
     pub scene: Option<usize>,
     pub camera: Option<CameraPlan>,
+    /// Null for a pinhole.
+    pub lens: Option<Lens>,
     pub outputs: Outputs,
     pub width: Option<u32>,
     pub height: Option<u32>,
@@ -64,6 +66,7 @@ pub struct Explanation {
     /// What may end sampling before.
     pub stopping: Option<StoppingRecord>,
     pub seed: u64,
+    pub integrator: &'static str,
     pub accel: Accel,
     /// Why `auto` does not take Embree; empty if it does.
     pub accel_note: String,
@@ -258,6 +261,7 @@ impl File<'_> {
             spp: render.spp,
             stopping: self.elsewhere.wanted(&self.run.tasks[self.task], 0, self.run.batch_time_limit).stopping(),
             seed: render.seed,
+            integrator: render.integrator.name(),
             crop: render.crop.map(|c| [c.x, c.y, c.width, c.height]),
             accel: Accel { requested: accel_name(render.accel).into(), ..Accel::default() },
             ..Explanation::default()
@@ -355,7 +359,7 @@ impl File<'_> {
         plan: &mut Explanation,
     ) -> Result<(), String> {
         let settings = self.settings();
-        let mut render = RenderSettings { threads: None, ..settings.render.clone() };
+        let mut render = RenderSettings { focus_point: scene.focus, threads: None, ..settings.render.clone() };
         (render.width, render.height) = size_for(settings.size, scene, camera);
         (plan.width, plan.height) = (Some(render.width), Some(render.height));
         plan.notes.extend(aspect_note(settings.size, scene, camera));
@@ -385,8 +389,12 @@ impl File<'_> {
         plan.seconds.build = Some(if is_first { start.elapsed().as_secs_f64() } else { 0.0 });
         describe_prepared(scene, prepared, plan);
         let seen = render::camera(scene, camera, prepared, &render);
+        let lens = render::lens(prepared, &seen, &render).map_err(|error| error.to_string())?;
+        plan.features.insert("depth_of_field".into(), lens.is_some());
+        plan.lens = lens.map(Lens::from);
+        plan.notes.extend(lens_notes(settings, lens.as_ref()));
         plan.camera = Some(self.camera(scene, camera, &seen));
-        let trial = guarded(|| Ok(pilot(prepared, &seen, &render)))?;
+        let trial = guarded(|| Ok(pilot(prepared, &seen, lens.as_ref(), &render)))?;
         let pixels = (u64::from(window.width) * u64::from(window.height)) as f64;
         let per_pixel =
             if settings.files.exr { EXR_SECONDS } else { 0.0 } + if settings.files.png { PNG_SECONDS } else { 0.0 };
@@ -455,7 +463,7 @@ fn describe_prepared(scene: &Scene, prepared: &Prepared, plan: &mut Explanation)
     plan.accel_note.clone_from(&accel.note);
     plan.front_triangles = Some(accel.front_triangles);
     plan.split_references = Some(accel.splits);
-    plan.features = features(scene, prepared).into_iter().map(|(name, has)| (name.into(), has)).collect();
+    plan.features = features(scene, prepared, false).into_iter().map(|(name, has)| (name.into(), has)).collect();
     if let Some(triangles) = &mut plan.triangles {
         (triangles.traced, triangles.stored) = (prepared.placed.triangles, prepared.placed.stored);
     }

@@ -11,11 +11,11 @@ use super::picture::FileOptions;
 use super::settings::FileSettings;
 use super::size::PictureSize;
 use super::view::{CameraSource, View};
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens};
 use crate::color::Exposure;
 use crate::image::exr::ExrOptions;
 use crate::load::LoadOptions;
-use crate::render::{CropWindow, Filter, Layers, RenderSettings, SpreadReport, Stopping};
+use crate::render::{CropWindow, Filter, Integrator, Layers, RenderSettings, SpreadReport, Stopping};
 use crate::scene::SourceFile;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -189,7 +189,7 @@ impl Wanted<'_> {
         }
 
         // The asset root only decides which files may be read; those that were are listed with their contents.
-        let LoadOptions { asset_root: _, scene, variant, obj_up, obj_scale, smooth_angle } = load;
+        let LoadOptions { asset_root: _, scene, variant, focus_on, obj_up, obj_scale, smooth_angle } = load;
         set("scene", scene.clone().unwrap_or_else(|| "default".into()));
         if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
             set("obj-up", name(obj_up));
@@ -197,6 +197,10 @@ impl Wanted<'_> {
             set("smooth-angle", smooth_angle.map_or_else(|| "off".into(), |angle| angle.to_string()));
         } else if let Some(variant) = variant {
             set("variant", variant.clone());
+        }
+
+        if let Some(node) = focus_on {
+            set("focus-on", node.clone());
         }
 
         let RenderSettings {
@@ -212,6 +216,10 @@ impl Wanted<'_> {
             adaptive: _,
             seed,
             frame,
+            integrator,
+            lens: Lens { f_stop, focus_distance, blades, sensor },
+            // Said by `focus-on` and the inputs.
+            focus_point: _,
             max_bounces,
             cull_backfaces,
             texture_lod,
@@ -243,6 +251,17 @@ impl Wanted<'_> {
         // Named only where they are on: pictures without them have the fingerprints that they had before there were any.
         if let Some(most) = clamp {
             set("clamp", most.to_string());
+        }
+        if *integrator != Integrator::Path {
+            set("integrator", integrator.name().into());
+        }
+        let blades = blades.map(f64::from);
+        for (name, value) in
+            [("f-stop", f_stop), ("focus-distance", focus_distance), ("aperture-blades", &blades), ("sensor", sensor)]
+        {
+            if let Some(value) = value {
+                set(name, value.to_string());
+            }
         }
         if *texture_lod {
             set("texture-lod", "on".into());

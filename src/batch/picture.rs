@@ -3,9 +3,10 @@
 use super::develop::Tone;
 use crate::camera::Projection;
 use crate::image::exr::{
-    self, ExrCamera, ExrChannel, ExrChannelSamples, ExrOptions, ExrPicture, ExrProjection, ExrSamples, ExrValue,
+    self, ExrCamera, ExrChannel, ExrChannelSamples, ExrLens, ExrOptions, ExrPicture, ExrProjection, ExrSamples,
+    ExrValue,
 };
-use crate::render::{Brdf, Frame, RenderSettings, SpreadReport};
+use crate::render::{Brdf, Frame, Integrator, LensReport, RenderSettings, SpreadReport};
 
 /// Which files, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,10 @@ pub(super) fn exr_bytes(
         pixels: &frame.pixels,
         channels: channels(frame),
         camera,
+        lens: frame
+            .stats
+            .lens
+            .map(|LensReport { thin, .. }| ExrLens { f_stop: thin.f_stop as f32, focus: thin.focus_distance as f32 }),
         attributes: attributes(frame, settings, clipped, fingerprint),
     };
     Ok((exr::encode(&picture, options)?, clipped))
@@ -89,7 +94,7 @@ fn attributes(
         ("prt:seed", ExrValue::Text(settings.seed.to_string())),
         ("prt:spp", ExrValue::Int(i32::try_from(frame.spp).unwrap_or(i32::MAX))),
         ("prt:accel", ExrValue::Text(stats.accel.used.into())),
-        ("prt:integrator", ExrValue::Text("path".into())),
+        ("prt:integrator", ExrValue::Text(settings.integrator.name().into())),
         ("prt:brdf", ExrValue::Text(brdf_name(settings.brdf).into())),
         // Part of the shading model (docs/conventions.md, "Shading normals").
         ("prt:normals", ExrValue::Text("repaired, terminator".into())),
@@ -115,6 +120,10 @@ fn attributes(
         if size > 0.0 {
             attributes.push((name, ExrValue::Double(size)));
         }
+    }
+    if let Some(LensReport { thin, .. }) = stats.lens {
+        let shape = if thin.blades == 0 { "round".into() } else { format!("{} blades", thin.blades) };
+        attributes.push(("prt:lens", ExrValue::Text(format!("radius {:e} m, {shape}", thin.radius))));
     }
     if settings.cull_backfaces {
         attributes.push(("prt:backfaces", ExrValue::Text("culled".into())));
@@ -143,6 +152,16 @@ fn light_name(frame: &Frame) -> &'static str {
 /// What biases the picture and why; `no` if nothing does.
 fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> String {
     let mut reasons = Vec::new();
+    match settings.integrator {
+        Integrator::Path => {}
+        Integrator::Direct => reasons.push("direct light alone (--integrator direct)".to_owned()),
+        Integrator::Whitted => reasons.push(format!(
+            "mirrors, clear glass and direct light alone, lamps as points; branches below {:e} of their path are left \
+             out (--integrator whitted)",
+            Integrator::LEAST_BRANCH
+        )),
+        other => reasons.push(format!("no light (--integrator {})", other.name())),
+    }
     if let Some(most) = settings.clamp {
         reasons.push(format!("indirect light is clamped at {most} nits (--clamp)"));
     }
@@ -153,7 +172,7 @@ fn bias_of(frame: &Frame, settings: &RenderSettings, clipped: Option<u64>) -> St
         reasons.push(format!("paths end after {bounces} scatterings (--max-bounces)"));
     }
     if frame.stats.truncated > 0.0 {
-        let (share, cap) = (frame.stats.truncated, RenderSettings::BOUNCE_CAP);
+        let (share, cap) = (frame.stats.truncated, settings.bounce_cap());
         reasons.push(format!("a share of {share:e} of the paths was cut at the cap of {cap} scatterings"));
     }
     if frame.stats.non_finite_samples > 0 {

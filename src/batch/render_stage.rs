@@ -1,6 +1,6 @@
 //! Renders the scenes that were read.
 
-use super::describe::{blank, describe};
+use super::describe::{blank, describe, lens_notes};
 use super::load_stage::{Contents, SceneFile};
 use super::memory::need;
 use super::panics::guarded;
@@ -181,6 +181,7 @@ impl RenderStage {
         match rendered {
             Ok(frame) => {
                 describe(&frame, image);
+                image.notes.extend(lens_notes(file, frame.stats.lens.as_ref()));
                 Ok(Some((frame, settings)))
             }
             Err(_) if is_interrupted => Err(Interrupted),
@@ -195,7 +196,7 @@ impl RenderStage {
 /// The settings of a camera's picture.
 pub(super) fn sized(file: &FileSettings, scene: &Scene, camera: usize) -> RenderSettings {
     let (width, height) = size_for(file.size, scene, camera);
-    RenderSettings { width, height, threads: None, ..file.render.clone() }
+    RenderSettings { width, height, focus_point: scene.focus, threads: None, ..file.render.clone() }
 }
 
 /// The run is to end.

@@ -2,7 +2,9 @@
 //! null, never a made-up number. Field names and their order are the contract of `docs/cli.md`.
 
 use super::fingerprint::Fingerprint;
+use crate::camera::ThinLens;
 use crate::color::Exposure;
+use crate::render::LensReport;
 use crate::scene::Skipped;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -55,6 +57,8 @@ pub struct ImageReport {
     pub height: Option<u32>,
     pub spp: u32,
     pub seed: u64,
+    /// What was computed: `path`, `direct`, `whitted`, `ao`, `normal`, `albedo`.
+    pub integrator: Option<String>,
     pub accel: Accel,
     pub seconds: Seconds,
     pub rays: Option<Rays>,
@@ -83,6 +87,8 @@ pub struct ImageReport {
     pub placed_instances: Option<u64>,
     pub lights: Option<u64>,
     pub default_light: Option<DefaultLight>,
+    /// Null for a pinhole.
+    pub lens: Option<Lens>,
     pub features: BTreeMap<String, bool>,
     pub skipped: Vec<Skipped>,
     pub warnings: Vec<String>,
@@ -200,6 +206,35 @@ pub struct DefaultLight {
     pub used: bool,
     pub emitted_lm_per_m2: f64,
     pub glowing_share: f64,
+}
+
+/// The lens of the camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the fields are the JSON's, described in docs/cli.md")]
+pub struct Lens {
+    pub f_stop: f64,
+    pub focal_length_mm: f64,
+    pub aperture_radius_m: f64,
+    /// Null: infinitely far.
+    pub focus_distance_m: Option<f64>,
+    /// Nobody said how far: it is the first surface in the picture's centre.
+    pub focus_found: bool,
+    /// 0: round.
+    pub blades: u32,
+}
+
+impl From<LensReport> for Lens {
+    fn from(LensReport { thin, is_found }: LensReport) -> Self {
+        let ThinLens { radius, focus_distance, blades, f_stop, focal_length } = thin;
+        Self {
+            f_stop,
+            focal_length_mm: 1e3 * focal_length,
+            aperture_radius_m: radius,
+            focus_distance_m: Some(focus_distance).filter(|distance| distance.is_finite()),
+            focus_found: is_found,
+            blades,
+        }
+    }
 }
 
 /// The exposure of the PNG.

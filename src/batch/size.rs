@@ -77,7 +77,7 @@ pub(super) fn check_crop(crop: CropWindow, width: u32, height: u32) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Camera;
+    use crate::camera::{Camera, Lens};
 
     #[test]
     fn size_follows_the_cameras_aspect_ratio() {
@@ -85,6 +85,7 @@ mod tests {
             name: String::new(),
             world_from_camera: glam::DMat4::IDENTITY,
             projection: Projection::Perspective { yfov: 1.0, aspect_ratio },
+            lens: Lens::default(),
         };
         let scene = Scene { cameras: vec![camera(Some(2.0)), camera(None)], ..Scene::default() };
         let size = PictureSize::Width(1280);
@@ -101,6 +102,7 @@ mod tests {
             name: String::new(),
             world_from_camera: glam::DMat4::IDENTITY,
             projection: Projection::Orthographic { xmag: 6.0, ymag: 2.0 },
+            lens: Lens::default(),
         };
         let scene = Scene { cameras: vec![camera], ..Scene::default() };
         assert_eq!(size_for(PictureSize::Width(300), &scene, 0), (300, 100));

@@ -1,6 +1,6 @@
 //! Cameras from elsewhere than the inputs: another file's, or one given by numbers.
 
-use crate::camera::{Camera, NoView, Projection, look_at};
+use crate::camera::{Camera, Lens, NoView, Projection, look_at};
 use crate::load::load_cameras;
 use crate::scene::Scene;
 use glam::DVec3;
@@ -74,7 +74,7 @@ impl View {
             }
         })?;
         let projection = Projection::Perspective { yfov: yfov.to_radians(), aspect_ratio: None };
-        Ok(Camera { name: Self::NAME.into(), world_from_camera, projection })
+        Ok(Camera { name: Self::NAME.into(), world_from_camera, projection, lens: Lens::default() })
     }
 }
 

@@ -127,7 +127,7 @@ pub fn ray_sets(
 /// Each batch is what a worker sends first of a 32x32 tile at 64 samples a pixel, from another place of its tile; the
 /// tiles are spread evenly over the picture.
 fn primary(prepared: &Prepared, camera: &Camera, batches: usize, seed: u64) -> Vec<RayBatch> {
-    let camera = CameraRays::new(camera, &[], PICTURE[0], PICTURE[1], prepared.origin);
+    let camera = CameraRays::new(camera, &[], PICTURE[0], PICTURE[1], prepared.origin, None);
     let tiles = PICTURE.map(|side| (side / TILE) as usize);
     let (count, pixels) = (tiles[0] * tiles[1], POOL as u32 / SAMPLES);
     let batch = |b: usize| {
@@ -171,7 +171,7 @@ impl Kernel for Generate<'_> {
             let u = key.group(L::U::splat(dims::CAMERA));
             let x = L::F::load(&rays.ox, at) + filter.offset::<L>(u[0]);
             let y = L::F::load(&rays.oy, at) + filter.offset::<L>(u[1]);
-            let (origin, direction): (V3<L>, V3<L>) = camera.ray::<L>(x, y, L::F::zero());
+            let (origin, direction): (V3<L>, V3<L>) = camera.ray::<L>(x, y, [u[2], u[3]], L::F::zero());
             origin.x.store(&mut rays.ox, at);
             origin.y.store(&mut rays.oy, at);
             origin.z.store(&mut rays.oz, at);

@@ -1,10 +1,13 @@
 //! Cameras as described by the file.
 
+mod aperture;
 mod filter;
+mod lens;
 mod look_at;
 mod rays;
 
 pub use filter::{FilterShape, PixelFilter};
+pub use lens::{Lens, ThinLens};
 pub use look_at::{NoView, look_at};
 pub use rays::CameraRays;
 
@@ -19,6 +22,8 @@ pub struct Camera {
     pub world_from_camera: DMat4,
     /// How points become pixels.
     pub projection: Projection,
+    /// What is said of its lens.
+    pub lens: Lens,
 }
 
 /// How points become pixels.

@@ -1,11 +1,12 @@
 //! Camera rays over N lanes.
 
-use super::{Camera, Projection};
+use super::aperture::Aperture;
+use super::{Camera, Projection, ThinLens};
 use crate::math::V3;
 use glam::{DMat4, DVec3};
 use simd::{Float, Lanes, Uint};
 
-/// A pinhole or orthographic camera for one picture size, in the prepared scene's space.
+/// A pinhole, a thin lens or an orthographic camera for one picture size, in the prepared scene's space.
 #[derive(Clone, Debug)]
 pub struct CameraRays {
     /// When the shutter opens.
@@ -19,12 +20,14 @@ pub struct CameraRays {
     per_pixel: [f32; 2],
     /// Rays start on the plane instead of at a point.
     is_parallel: bool,
+    /// Rays start on a lens.
+    aperture: Option<Aperture>,
 }
 
 /// Where the camera is and looks.
 #[derive(Clone, Copy, Debug)]
 struct View {
-    /// The pinhole, or the centre of the plane where parallel rays start; metres.
+    /// The pinhole, the centre of the lens, or that of the plane where parallel rays start; metres.
     origin: [f32; 3],
     /// Direction through the picture's centre.
     forward: [f32; 3],
@@ -64,8 +67,16 @@ impl View {
 impl CameraRays {
     /// A camera for a picture of `width` x `height` pixels in a scene recentred on `origin` (f64, world metres). The
     /// vertical field of view (or height) is kept; the horizontal one follows from the picture's shape. `later` is where the
-    /// camera is at later times of the shutter, as `scene::Motion` has it; empty for one at rest.
-    pub fn new(camera: &Camera, later: &[DMat4], width: u32, height: u32, origin: DVec3) -> Self {
+    /// camera is at later times of the shutter, as `scene::Motion` has it; empty for one at rest. Rays start on `lens`, if
+    /// there is one; an orthographic camera has none.
+    pub fn new(
+        camera: &Camera,
+        later: &[DMat4],
+        width: u32,
+        height: u32,
+        origin: DVec3,
+        lens: Option<&ThinLens>,
+    ) -> Self {
         let (half_height, is_parallel) = match camera.projection {
             Projection::Perspective { yfov, .. } => ((0.5 * yfov).tan(), false),
             Projection::Orthographic { ymag, .. } => (ymag, true),
@@ -84,6 +95,7 @@ impl CameraRays {
             pixel: (2.0 * half_height / f64::from(height)) as f32,
             per_pixel: [(2.0 / f64::from(width)) as f32, (2.0 / f64::from(height)) as f32],
             is_parallel,
+            aperture: lens.map(|lens| Aperture::new(lens, [half_height * aspect, half_height])),
         }
     }
 
@@ -120,9 +132,9 @@ impl CameraRays {
     }
 
     /// Origin and unit direction of the rays through film points (`x`, `y`), pixels from the top left corner, at `time` in
-    /// [0, 1] of the shutter.
+    /// [0, 1] of the shutter; `lens`, in the unit square, says where on the lens they start, if there is one.
     #[inline(always)]
-    pub fn ray<L: Lanes>(&self, x: L::F, y: L::F, time: L::F) -> (V3<L>, V3<L>) {
+    pub fn ray<L: Lanes>(&self, x: L::F, y: L::F, lens: [L::F; 2], time: L::F) -> (V3<L>, V3<L>) {
         let one = L::F::one();
         let sx = x.mul_add(L::F::splat(self.per_pixel[0]), -one);
         let sy = y.mul_add(L::F::splat(self.per_pixel[1]), -one);
@@ -131,6 +143,8 @@ impl CameraRays {
             return (right.mul_add(sx, down.mul_add(sy, origin)), forward);
         }
         let d = right.mul_add(sx, down.mul_add(sy, forward));
+        let Some(aperture) = &self.aperture else { return (origin, d.normalized()) };
+        let (origin, d) = aperture.ray(origin, d, [right, down], lens);
         (origin, d.normalized())
     }
 

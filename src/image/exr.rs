@@ -57,6 +57,8 @@ pub struct ExrPicture<'a> {
     pub channels: Vec<ExrChannel>,
     /// For `worldToCamera` and `worldToNDC`.
     pub camera: ExrCamera,
+    /// For `aperture` and `focus`; `None`: a pinhole, or nobody knows.
+    pub lens: Option<ExrLens>,
     /// The other attributes; names of at most 31 bytes, each once.
     pub attributes: Vec<(&'static str, ExrValue)>,
 }
@@ -103,6 +105,15 @@ pub enum ExrProjection {
         /// Half of the height of what is seen, metres.
         half_height: f64,
     },
+}
+
+/// OpenEXR's own attributes of a lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExrLens {
+    /// `aperture`: the f-number.
+    pub f_stop: f32,
+    /// Metres to what is sharp; may be infinite.
+    pub focus: f32,
 }
 
 /// Value of an attribute.
@@ -239,6 +250,9 @@ fn image<'c, C: WritableChannels<'c> + 'c>(
             ExrValue::Double(value) => AttributeValue::F64(*value),
         };
         layer.attributes.other.insert(text(name), value);
+    }
+    if let Some(ExrLens { f_stop, focus }) = picture.lens {
+        (layer.attributes.aperture, layer.attributes.focus) = (Some(f_stop), Some(focus));
     }
     let mut image = Image::from_layer(layer);
     image.attributes.display_window =

@@ -30,6 +30,7 @@ fn picture(width: u32, height: u32, pixels: &[[f32; 3]]) -> ExrPicture<'_> {
         pixels,
         channels: Vec::new(),
         camera,
+        lens: None,
         attributes,
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::accel::HitBatch;
-use crate::camera::{Camera, CameraRays, Projection};
+use crate::camera::{Camera, CameraRays, Lens, Projection};
 use crate::integrator::interaction::interact;
 use crate::light::table::LightTable;
 use crate::material::Material;
@@ -127,14 +127,15 @@ fn camera_cones_have_the_solid_angle_of_their_pixel() {
 
         #[inline(always)]
         fn run<L: Lanes>(self) -> [f64; 2] {
-            let (_, direction) = self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]), L::F::zero());
+            let (_, direction) = self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]), [L::F::zero(); 2], L::F::zero());
             let (width, spread) = self.0.cone::<L>(direction);
             [width, spread].map(|v| f64::from(v.first()))
         }
     }
     let of = |projection, pixel| {
-        let camera = Camera { name: String::new(), world_from_camera: DMat4::IDENTITY, projection };
-        simd::dispatch(simd::Level::best(), Cones(CameraRays::new(&camera, &[], 200, 100, DVec3::ZERO), pixel))
+        let camera =
+            Camera { name: String::new(), world_from_camera: DMat4::IDENTITY, projection, lens: Lens::default() };
+        simd::dispatch(simd::Level::best(), Cones(CameraRays::new(&camera, &[], 200, 100, DVec3::ZERO, None), pixel))
     };
     let yfov = 1.2_f64;
     let perspective = Projection::Perspective { yfov, aspect_ratio: None };

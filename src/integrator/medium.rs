@@ -127,6 +127,14 @@ impl<L: Lanes> Crossing<L> {
         L::outline(Cross { tables, pool, at, material, front, hit, key })
     }
 
+    /// The same for paths that take no wavelengths: with the indices at the d line.
+    #[inline(always)]
+    pub fn without_dispersion(self, media: &MediumTable) -> Self {
+        let eta = media.ior::<L>(self.behind) / media.ior::<L>(self.before);
+        let eta = eta.or_else(self.is_boundary & !self.behind.eq(self.before), L::F::one());
+        Self { eta, dispersed: None, ..self }
+    }
+
     /// What is left of light that came `distance` to the surface.
     #[inline(always)]
     pub fn transmittance(&self, media: &MediumTable, distance: L::F) -> V3<L> {

@@ -1,8 +1,10 @@
-//! The path tracer as a batched wavefront: `wave` is the loop, `pool` the state of the paths, `shade` one vertex.
+//! The path tracer as a batched wavefront: `wave` is the loop, `pool` the state of the paths, `shade` one vertex. The other
+//! integrators are other vertices in the same loop: `whitted`, whose paths branch (`branches`), and `first_hit`.
 //!
 //! Why batches: at the same ray kernel a wavefront with SIMD shading measured 1.3 (diffuse) to 2.1 times (GGX, textures,
 //! Sobol) the speed of a scalar megakernel, and the seam "a batch of rays in, a batch of hits out" is what packets want.
 
+mod branches;
 mod bulbs;
 mod clamp;
 mod closure;
@@ -11,7 +13,9 @@ mod coverage;
 mod dispersion;
 mod emission;
 mod exact;
+mod first_hit;
 mod interaction;
+mod kind;
 mod light_sample;
 mod medium;
 mod miss;
@@ -24,15 +28,17 @@ mod terminator;
 mod through;
 mod wave;
 mod weight;
+mod whitted;
 
 pub use coverage::Coverage;
 pub use dispersion::Spectrum;
+pub use kind::Integrator;
 pub use pool::POOL;
 pub use wave::{Counters, SampleSink, Unit, Worker};
 
 use crate::accel::Accel;
 use crate::camera::{CameraRays, PixelFilter};
-use crate::light::table::{LightTable, Sources};
+use crate::light::table::{FixedPoint, LightTable, Sources};
 use crate::material::media::MediumTable;
 use crate::material::table::MaterialTable;
 use crate::shape::exact::table::ShapeTable;
@@ -84,10 +90,14 @@ pub struct PathTracer<'a> {
     pub tables: &'a SceneTables,
     /// What rays hit.
     pub accel: &'a dyn Accel,
+    /// What stands for the lights where nothing is left to chance; empty elsewhere.
+    pub lamps: Vec<FixedPoint>,
     /// Where rays start.
     pub camera: CameraRays,
     /// How film points are spread about pixel centres.
     pub filter: PixelFilter,
+    /// What is computed.
+    pub integrator: Integrator,
     /// Scatterings after the first.
     pub max_bounces: u32,
     /// Whether reaching `max_bounces` counts as truncation (a safety cap) and not as the user's wish.

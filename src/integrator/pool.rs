@@ -1,6 +1,7 @@
 //! The state of a worker's paths, structure of arrays, small enough for the L2 cache.
 
 use super::SceneTables;
+use super::branches::Branches;
 use super::bulbs::BulbRays;
 use super::medium::DEPTH;
 use super::receiver::{self, Remembered};
@@ -54,6 +55,8 @@ pub struct PathPool {
     pub bulbs: Option<Box<BulbRays>>,
     /// From where its last light was chosen (`receiver.rs`).
     pub from: Remembered,
+    /// Paths that wait, in pictures whose paths branch.
+    pub branches: Option<Box<Branches>>,
     /// What choosing a light needs.
     pub light_scratch: Buffer<f32>,
     /// Where the path's radiance is.
@@ -110,6 +113,7 @@ impl PathPool {
             glass: None,
             bulbs: None,
             from: std::array::from_fn(|_| Buffer::new(0)),
+            branches: None,
             light_scratch: Buffer::new(0),
             slot: ints(),
             radiance: vec![[0.0; 3]; POOL],
@@ -211,6 +215,9 @@ impl PathPool {
     /// Adds to the radiance of a slot.
     #[inline(always)]
     pub fn add(&mut self, slot: u32, radiance: [f32; 3]) {
+        if self.add_of_branch(slot, radiance) {
+            return;
+        }
         let sum = &mut self.radiance[slot as usize];
         for (s, r) in sum.iter_mut().zip(radiance) {
             *s += r;

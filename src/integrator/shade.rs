@@ -1,11 +1,10 @@
 //! One vertex of N paths: emission, a light sample, a BSDF sample, roulette.
 
-use super::PathTracer;
 use super::clamp::{Limit, add_limited};
 use super::closure::{closure, surface};
 use super::cone::Cone;
 use super::emission::emitted;
-use super::interaction::interact;
+use super::interaction::{Interaction, interact};
 use super::light_sample::{Vertex, queue_light_sample};
 use super::medium::{Crossing, Stack};
 use super::miss::see_environment;
@@ -14,6 +13,7 @@ use super::receiver::{self, receiver};
 use super::sized::{see_balls, see_suns};
 use super::wave::Counters;
 use super::weight::remembered;
+use super::{Integrator, PathTracer, SceneTables};
 use crate::accel::MISS;
 use crate::material::media::{AIR, MediumTable};
 use crate::math::V3;
@@ -95,9 +95,7 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     let key = Key::<L> { pixel: L::U::load(&pool.seed, at), sample: L::U::load(&pool.sample, at) };
     let mut culled = L::M::from_bits(0);
     if tracer.cull_backfaces {
-        culled = tables.materials.single_sided::<L>(si.triangle.material, hit) & depth.eq(L::U::splat(0)) & !si.front;
-        // The boundary of a volume has two sides whatever the file says of its surface.
-        culled = culled & !tables.media.is_boundary::<L>(MediumTable::inside::<L>(si.triangle.material), culled);
+        culled = is_culled(tables, &si, hit & depth.eq(L::U::splat(0)));
         hit = hit & !culled;
     }
     // What lies between the last scattering and this hit: media that absorb, glass that was gone straight through.
@@ -137,7 +135,11 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     }
 
     let allowed = depth.lt(L::U::splat(tracer.max_bounces.saturating_add(1)));
-    let scatters = hit & allowed;
+    let mut scatters = hit & allowed;
+    if tracer.integrator == Integrator::Direct {
+        // Mirrors and clear glass show what is beyond them; what anything else scattered only finds lamps.
+        scatters = scatters & !L::F::load(&pool.prev_pdf, at).is_finite();
+    }
     // Going straight through is no scattering.
     let shaded = scatters | (thin & hit);
     let eta = match &crossing {
@@ -264,6 +266,14 @@ fn shade<L: Lanes>(tracer: &PathTracer<'_>, pool: &mut PathPool, counters: &mut 
     key.sample.compress(alive, &mut pool.sample, to);
     slot.compress(alive, &mut pool.slot, to);
     pool.n += alive.count();
+}
+
+/// The camera rays of `hit` that pass the surface because it is seen from behind.
+#[inline(always)]
+pub(super) fn is_culled<L: Lanes>(tables: &SceneTables, si: &Interaction<L>, hit: L::M) -> L::M {
+    let culled = tables.materials.single_sided::<L>(si.triangle.material, hit) & !si.front;
+    // The boundary of a volume has two sides whatever the file says of its surface.
+    culled & !tables.media.is_boundary::<L>(MediumTable::inside::<L>(si.triangle.material), culled)
 }
 
 #[inline(always)]

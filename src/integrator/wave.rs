@@ -1,8 +1,10 @@
 //! The loop: refill with camera rays, intersect, shade, test shadow rays, add.
 
-use super::PathTracer;
+use super::first_hit::FirstHit;
 use super::pool::{POOL, PathPool};
 use super::shade::Shade;
+use super::whitted::Whitted;
+use super::{Integrator, PathTracer};
 use crate::math::V3;
 use crate::sampler::{Key, coverage_key, dims, pixel_seed};
 use simd::{Float, Kernel, Lanes, Uint, dispatch_large};
@@ -91,8 +93,10 @@ impl PathTracer<'_> {
     pub fn trace(&self, unit: &Unit, worker: &mut Worker, sink: &mut impl SampleSink) {
         let Worker { pool, counters } = worker;
         pool.fit(self.tables, self.clamp.is_some());
+        pool.fit_branches(self.integrator == Integrator::Whitted);
         let mut feed = Feed::new(unit);
         loop {
+            pool.resume();
             let old = pool.n;
             feed.refill(self, unit, pool);
             let n = pool.n;
@@ -104,13 +108,21 @@ impl PathTracer<'_> {
             counters.camera += (n - old) as u64;
             counters.bounce += old as u64;
 
-            dispatch_large(self.level, Shade { tracer: self, pool, counters });
+            match self.integrator {
+                Integrator::Path | Integrator::Direct => {
+                    dispatch_large(self.level, Shade { tracer: self, pool, counters });
+                }
+                Integrator::Whitted => dispatch_large(self.level, Whitted { tracer: self, pool, counters }),
+                Integrator::Ao | Integrator::Normal | Integrator::Albedo => {
+                    dispatch_large(self.level, FirstHit { tracer: self, pool });
+                }
+            }
 
             self.shadow(pool, counters);
             self.light_of_bulbs(pool, counters);
             for i in 0..pool.n_dead {
                 let slot = pool.dead[i];
-                let radiance = std::mem::take(&mut pool.radiance[slot as usize]);
+                let radiance = pool.gathered(slot);
                 let (pixel, sample) = pool.origin[slot as usize];
                 let taken = pool.taken.get_mut(slot as usize).map_or(0.0, std::mem::take);
                 if radiance.iter().all(|r| r.is_finite()) {
@@ -132,8 +144,9 @@ impl PathTracer<'_> {
 
 impl PathTracer<'_> {
     /// Adds what arrives along the queued shadow rays.
-    fn shadow(&self, pool: &mut PathPool, counters: &mut Counters) {
-        if pool.glass.is_some() {
+    pub(super) fn shadow(&self, pool: &mut PathPool, counters: &mut Counters) {
+        // Occlusion knows no colours.
+        if pool.glass.is_some() && self.integrator != Integrator::Ao {
             return self.shadow_through_glass(pool, counters);
         }
         let n_shadow = pool.n_shadow;
@@ -192,6 +205,7 @@ impl Feed {
                     beta[n] = 1.0;
                 }
                 pool.begin(n);
+                pool.begin_branches(slot);
                 n += 1;
                 self.sample += 1;
             }
@@ -232,7 +246,7 @@ impl Kernel for Generate<'_, '_> {
                 time = key.group(L::U::splat(dims::TIME))[0];
                 time.store(&mut pool.rays.time, at);
             }
-            let (origin, direction): (V3<L>, V3<L>) = tracer.camera.ray::<L>(x, y, time);
+            let (origin, direction): (V3<L>, V3<L>) = tracer.camera.ray::<L>(x, y, [u[2], u[3]], time);
             if tracer.tables.textures.has_levels() {
                 let (width, spread) = tracer.camera.cone::<L>(direction);
                 width.store(&mut pool.cone_width, at);

@@ -19,6 +19,11 @@ use glam::DVec3;
 use simd::{Float, Lanes, Mask, Part, Uint};
 use std::ops::Range;
 
+#[path = "fixed.rs"]
+mod fixed;
+
+pub use fixed::FixedPoint;
+
 /// What of the scene lights are read from.
 #[derive(Clone, Copy)]
 pub struct Sources<'a> {

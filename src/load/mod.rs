@@ -25,6 +25,8 @@ pub struct LoadOptions {
     pub scene: Option<String>,
     /// glTF: the name of one of the file's variants of materials (`KHR_materials_variants`); `None` = its own materials.
     pub variant: Option<String>,
+    /// glTF: the name of a node on which lenses are to be focused, whose place becomes [`Scene::focus`].
+    pub focus_on: Option<String>,
     /// OBJ: which axis points up.
     pub obj_up: obj::ObjUp,
     /// OBJ: metres per unit, above 0; `None` = 1.
@@ -50,6 +52,11 @@ pub struct LoadTimes {
 pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes), LoadError> {
     match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
         Some("gltf" | "glb") => gltf::load(path, options),
+        Some("obj") if options.focus_on.is_some() => Err(LoadError::new(
+            SourceLoc::file(path),
+            "--focus-on: an OBJ has no nodes",
+            "Use --focus-distance, in metres.",
+        )),
         Some("obj") => obj::load(path, options),
         _ => Err(LoadError::new(SourceLoc::file(path), "not a scene file", "Allowed: .gltf, .glb, .obj.")),
     }

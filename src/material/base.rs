@@ -22,6 +22,8 @@ use std::f32::consts::FRAC_1_PI;
 
 #[path = "base_albedo.rs"]
 mod albedo;
+#[path = "base_mirrors.rs"]
+mod mirrors;
 
 /// Below this alpha the specular lobe is a mirror.
 pub const DELTA_ALPHA: f32 = 1e-4;

@@ -12,6 +12,11 @@ use super::surface::Surface;
 use crate::math::{Frame, V3};
 use simd::{Float, Lanes, Mask, Part, Scalar};
 
+#[path = "bsdf_mirrors.rs"]
+mod mirrors;
+
+pub use mirrors::Mirror;
+
 /// A surface's reflection and transmission at one hit; no textures left.
 pub struct Bsdf<'e, L: Lanes> {
     /// Local frame about the shading normal.

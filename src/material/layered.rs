@@ -101,9 +101,25 @@ impl<'e> Layered<'e> {
     }
 
     /// What sheen and coat leave of what goes to or comes from local `wi`.
-    fn left(&self, wi: V3<Scalar>) -> F {
+    pub(super) fn left(&self, wi: V3<Scalar>) -> F {
         let coat = self.coat.as_ref().map_or(F::one(), |(coat, _)| coat.scale());
         self.sheen.as_ref().map_or(coat, |sheen| coat * sheen.scale(wi))
+    }
+
+    /// What lies below coat and sheen; `None` for the Disney BRDF.
+    pub(super) fn base(&self) -> Option<&Base<'e, Scalar, Rich>> {
+        match &self.ground {
+            Ground::Base(base) => Some(base),
+            Ground::Disney(_) => None,
+        }
+    }
+
+    /// The direction of the coat's mirror, world space, and what it reflects; `None` where there is none.
+    pub(super) fn coat_mirror(&self) -> Option<(V3<Scalar>, V3<Scalar>)> {
+        let (coat, frame) = self.coat.as_ref().filter(|(coat, _)| coat.is_delta().any())?;
+        // A mirror has one direction, whatever the numbers.
+        let wi = frame.to_world(coat.sample([F::zero(), F::zero()]));
+        Some((wi, V3::splat([1.0; 3]).scale(coat.mirror())))
     }
 
     /// Value and density.

@@ -4,8 +4,8 @@ use super::Prepared;
 use crate::material::Material;
 use crate::scene::Scene;
 
-/// Named yes/no facts about `scene` as it was prepared, in a fixed order.
-pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)> {
+/// Named yes/no facts about `scene` as it was prepared and is seen, through a lens or not, in a fixed order.
+pub fn features(scene: &Scene, prepared: &Prepared, has_lens: bool) -> Vec<(&'static str, bool)> {
     let tables = &prepared.tables;
     vec![
         ("emissive_surfaces", tables.lights.has_triangles()),
@@ -25,5 +25,6 @@ pub fn features(scene: &Scene, prepared: &Prepared) -> Vec<(&'static str, bool)>
         ("instances", !tables.placements.is_empty()),
         ("motion", !scene.motion.is_empty()),
         ("exact_shapes", !tables.shapes.is_empty()),
+        ("depth_of_field", has_lens),
     ]
 }

@@ -5,8 +5,8 @@ use super::prepare::prepare;
 use super::schedule::Totals;
 use super::stopping::{Next, StoppedBy, Waves};
 use super::{
-    Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, SpreadReport, TargetReport, schedule,
-    tracer,
+    Frame, FrameCamera, Phase, Prepared, Progress, RenderSettings, RenderStats, SpreadReport, TargetReport, lens,
+    schedule, tracer,
 };
 use crate::error::RenderError;
 use crate::film::{Errors, Film, Spread, TILE, Tile};
@@ -33,7 +33,7 @@ pub fn pool(threads: Option<usize>) -> Result<rayon::ThreadPool, RenderError> {
 /// bounds, index 0), on the current rayon pool or, if the settings give a number of threads, on one of its own.
 ///
 /// # Errors
-/// The backend is not to be had, the scene is too large, or `progress` was cancelled.
+/// The backend is not to be had, the scene is too large, the camera has no such lens, or `progress` was cancelled.
 ///
 /// # Panics
 /// When `camera` is out of range, or the settings are (sizes, samples and lanes are checked by whoever made them).
@@ -72,7 +72,7 @@ fn render_here(
 /// statistics are 0.
 ///
 /// # Errors
-/// `progress` was cancelled.
+/// The camera has no such lens, or `progress` was cancelled.
 ///
 /// # Panics
 /// As [`render`].
@@ -88,7 +88,8 @@ pub fn render_prepared(
     let later = tracer::later(scene, camera);
     let camera = tracer::camera(scene, camera, &prepared, settings);
     let window = tracer::window(settings);
-    let tracer = tracer::tracer(&prepared, &camera, later, settings);
+    let lens = lens(&prepared, &camera, settings)?;
+    let tracer = tracer::tracer(&prepared, &camera, later, lens.as_ref().map(|lens| &lens.thin), settings);
     let window_tile = Tile { x: window.x, y: window.y, width: window.width, height: window.height };
     progress.enter(Phase::Rendering);
     let start = Instant::now();
@@ -100,7 +101,7 @@ pub fn render_prepared(
 
     let shown = pixels.iter().flatten().map(|&channel| f64::from(channel)).sum::<f64>() * f64::from(spp);
     let taken = totals.counters.taken;
-    let features = features(scene, &prepared);
+    let features = features(scene, &prepared, lens.is_some());
     let lanes = tracer.level.lanes();
     let mut warnings = prepared.warnings;
     if totals.non_finite > 0 {
@@ -152,6 +153,7 @@ pub fn render_prepared(
         features,
         default_light: prepared.default_light,
         environment: tables.lights.has_environment() && !prepared.default_light.used,
+        lens,
         accel: prepared.accel_report,
         lanes,
         warnings,

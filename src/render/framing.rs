@@ -2,7 +2,7 @@
 //! The policy is stated in docs/conventions.md, "Framing".
 
 use super::shapes;
-use crate::camera::{Camera, Projection};
+use crate::camera::{Camera, Lens, Projection};
 use crate::scene::{Instance, Scene};
 use crate::shape::placement::cofactor;
 use glam::{DMat3, DMat4, DVec3};
@@ -39,7 +39,8 @@ pub(super) fn framing_camera(bounds: Option<(DVec3, DVec3)>, vector_area: DVec3,
     let distance = if nearest > 0.0 { nearest } else { 1.0 };
     let eye = centre + towards * distance;
     let world_from_camera = DMat4::from_cols(right.extend(0.0), up.extend(0.0), towards.extend(0.0), eye.extend(1.0));
-    Camera { name: String::new(), world_from_camera, projection: Projection::Perspective { yfov, aspect_ratio: None } }
+    let projection = Projection::Perspective { yfov, aspect_ratio: None };
+    Camera { name: String::new(), world_from_camera, projection, lens: Lens::default() }
 }
 
 /// From bounds of these `extents` towards the camera; any length, never along Y.

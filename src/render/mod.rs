@@ -7,6 +7,7 @@ mod features;
 mod flatten;
 mod frame;
 mod framing;
+mod lens;
 pub mod memory;
 mod moving;
 mod opacity;
@@ -25,11 +26,14 @@ pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use features::features;
 pub use frame::{pool, render, render_prepared};
 pub use framing::FRAMING_YFOV;
+pub use lens::{LensReport, lens};
 pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
 pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};
 pub use progress::{Phase, Progress};
-pub use settings::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers, RenderSettings};
+pub use settings::{
+    AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Integrator, Layers, RenderSettings,
+};
 pub use stopping::{StoppedBy, Stopping};
 pub use tracer::{camera, window};
 
@@ -109,6 +113,8 @@ pub struct RenderStats {
     pub default_light: DefaultLightReport,
     /// Whether the scene has an environment of its own, or was given one, that shines.
     pub environment: bool,
+    /// The lens; `None`: a pinhole, or parallel rays.
+    pub lens: Option<LensReport>,
     /// Which backend and why.
     pub accel: AccelReport,
     /// SIMD lanes that shaded: 1, 8 or 16.

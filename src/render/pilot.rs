@@ -1,7 +1,7 @@
 //! How long a picture will take: a few thousand of its paths, spread over it, are traced and timed.
 
 use super::tracer::{tracer, window};
-use super::{CropWindow, Prepared, RenderSettings};
+use super::{CropWindow, LensReport, Prepared, RenderSettings};
 use crate::camera::Camera;
 use crate::film::{BLOCKS, TILE};
 use crate::integrator::{Counters, SampleSink, Unit, Worker};
@@ -46,10 +46,11 @@ impl SampleSink for Nowhere {
     }
 }
 
-/// Traces paths of the picture of `camera` for about a tenth of a second on the threads of the current rayon pool.
+/// Traces paths of the picture of `camera` through `lens` for about a tenth of a second on the threads of the current rayon pool.
 /// Nothing is kept of them.
-pub fn pilot(prepared: &Prepared, camera: &Camera, settings: &RenderSettings) -> Pilot {
-    let (tracer, window) = (tracer(prepared, camera, &[], settings), window(settings));
+pub fn pilot(prepared: &Prepared, camera: &Camera, lens: Option<&LensReport>, settings: &RenderSettings) -> Pilot {
+    let lens = lens.map(|lens| &lens.thin);
+    let (tracer, window) = (tracer(prepared, camera, &[], lens, settings), window(settings));
     let samples = settings.spp.div_ceil(BLOCKS).min(SAMPLES);
     let side = if samples < FEW_SAMPLES { TILE } else { PATCH };
     let next = AtomicU32::new(0);

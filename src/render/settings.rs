@@ -2,6 +2,8 @@
 
 use super::stopping::Stopping;
 pub use crate::camera::FilterShape;
+use crate::camera::Lens;
+pub use crate::integrator::Integrator;
 pub use crate::material::energy::Brdf;
 use std::path::PathBuf;
 
@@ -94,7 +96,13 @@ pub struct RenderSettings {
     pub seed: u64,
     /// Animation frame number; part of the random numbers.
     pub frame: u32,
-    /// Scatterings after the first; `None` = roulette alone ends paths (safety cap [`RenderSettings::BOUNCE_CAP`]).
+    /// What is computed.
+    pub integrator: Integrator,
+    /// What of the lens is to be another than the camera's own.
+    pub lens: Lens,
+    /// A point that a lens is focused on, world space, metres, in place of a distance.
+    pub focus_point: Option<glam::DVec3>,
+    /// Scatterings after the first; `None` = roulette alone ends paths (safety cap [`RenderSettings::bounce_cap`]).
     pub max_bounces: Option<u32>,
     /// Camera rays pass single-sided surfaces from behind; other rays do not.
     pub cull_backfaces: bool,
@@ -127,6 +135,12 @@ pub struct RenderSettings {
 impl RenderSettings {
     /// Scatterings at which a path is cut whatever roulette says; the share of paths cut is reported.
     pub const BOUNCE_CAP: u32 = 1024;
+
+    /// Scatterings at which a path is cut without `max_bounces`: nothing ends the branches of Whitted's tracer in a box of
+    /// mirrors.
+    pub fn bounce_cap(&self) -> u32 {
+        if self.integrator == Integrator::Whitted { 64 } else { Self::BOUNCE_CAP }
+    }
 }
 
 impl Default for RenderSettings {
@@ -140,6 +154,9 @@ impl Default for RenderSettings {
             adaptive: true,
             seed: 0,
             frame: 0,
+            integrator: Integrator::Path,
+            lens: Lens::default(),
+            focus_point: None,
             max_bounces: None,
             cull_backfaces: false,
             texture_lod: false,

@@ -2,8 +2,8 @@
 
 use super::framing::{framing_camera, vector_area};
 use super::{CropWindow, Prepared, RenderSettings};
-use crate::camera::{Camera, CameraRays, PixelFilter};
-use crate::integrator::PathTracer;
+use crate::camera::{Camera, CameraRays, PixelFilter, ThinLens};
+use crate::integrator::{Integrator, PathTracer};
 use crate::scene::Scene;
 use glam::DMat4;
 use simd::Level;
@@ -32,7 +32,8 @@ pub fn later(scene: &Scene, index: usize) -> &[DMat4] {
     scene.motion.cameras.get(&(index as u32)).map_or(&[], Vec::as_slice)
 }
 
-/// The tracer of a picture of `camera`, which is at `later` after the shutter has opened.
+/// The tracer of a picture of `camera`, which is at `later` after the shutter has opened, taken through `lens` (see
+/// [`super::lens()`]).
 ///
 /// # Panics
 /// When `settings.lanes` is none of 1, 8, 16.
@@ -40,6 +41,7 @@ pub fn tracer<'p>(
     prepared: &'p Prepared,
     camera: &Camera,
     later: &[DMat4],
+    lens: Option<&ThinLens>,
     settings: &RenderSettings,
 ) -> PathTracer<'p> {
     let level = match settings.lanes {
@@ -50,12 +52,15 @@ pub fn tracer<'p>(
         Some(n) => panic!("{n} lanes; allowed: 1, 8, 16"),
     }
     .without_portable();
+    let is_whitted = settings.integrator == Integrator::Whitted;
     PathTracer {
         tables: &prepared.tables,
         accel: &*prepared.accel,
-        camera: CameraRays::new(camera, later, settings.width, settings.height, prepared.origin),
+        lamps: if is_whitted { prepared.tables.lights.fixed_points() } else { Vec::new() },
+        camera: CameraRays::new(camera, later, settings.width, settings.height, prepared.origin, lens),
         filter: PixelFilter::new(settings.filter.shape, settings.filter.width),
-        max_bounces: settings.max_bounces.unwrap_or(RenderSettings::BOUNCE_CAP),
+        integrator: settings.integrator,
+        max_bounces: settings.max_bounces.unwrap_or(settings.bounce_cap()),
         is_capped: settings.max_bounces.is_none(),
         cull_backfaces: settings.cull_backfaces,
         clamp: settings.clamp,

@@ -94,6 +94,11 @@ impl SceneBuilder {
         &mut self.scene.motion
     }
 
+    /// Says where the node is on which lenses are to be focused, world space, metres.
+    pub fn set_focus(&mut self, point: glam::DVec3) {
+        self.scene.focus = Some(point);
+    }
+
     /// Says which files the scene was made from.
     pub fn set_sources(&mut self, sources: Vec<SourceFile>) {
         self.scene.sources = sources;

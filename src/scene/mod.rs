@@ -18,7 +18,7 @@ use crate::material::Material;
 use crate::shape::Mesh;
 use crate::shape::exact::ExactShape;
 use crate::texture::{Image, Texture};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use std::sync::Arc;
 
 /// A mesh placed in the world.
@@ -86,6 +86,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Cameras with their place.
     pub cameras: Vec<Camera>,
+    /// Where the node is on which lenses are to be focused, world space, metres; `None`: none was asked for.
+    pub focus: Option<DVec3>,
     /// What of it moves while the shutter is open; empty for a scene at rest.
     pub motion: Motion,
     /// Which scene of the file this is.

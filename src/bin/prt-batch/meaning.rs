@@ -6,6 +6,7 @@ use crate::parse;
 use clap::ArgMatches;
 use prt::batch::input::expand;
 use prt::batch::{CameraSource, EnvironmentSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
+use prt::camera::Lens;
 use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
 use prt::render::{RenderSettings, Stopping};
@@ -129,6 +130,13 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         stopping,
         layers: args.aov.unwrap_or_default(),
         seed: args.seed,
+        integrator: args.integrator,
+        lens: Lens {
+            f_stop: args.f_stop,
+            focus_distance: args.focus_distance,
+            blades: args.aperture_blades,
+            sensor: args.sensor,
+        },
         max_bounces: args.max_bounces,
         filter: args.filter,
         brdf: args.brdf,
@@ -154,6 +162,7 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
             asset_root: args.asset_root.clone(),
             scene: args.scene.clone(),
             variant: args.variant.clone(),
+            focus_on: args.focus_on.clone(),
             obj_up: args.obj_up,
             obj_scale: args.obj_scale,
             smooth_angle: args.smooth_angle,

@@ -5,10 +5,11 @@ use crate::generate::Product;
 use crate::words::Words;
 use clap::builder::{PossibleValue, TypedValueParser};
 use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
+use prt::camera::Lens;
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
-use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Layers};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Integrator, Layers};
 use prt::verify::contenders::Backend;
 use std::ffi::OsStr;
 use std::str::FromStr;
@@ -246,8 +247,33 @@ pub fn brdf() -> Words<Brdf> {
     Words::new(&[("full", Brdf::Full), ("appendix-b", Brdf::AppendixB)], &[])
 }
 
-pub fn integrator() -> Words<&'static str> {
-    Words::new(&[("path", "path")], &["direct", "whitted", "ao", "normal", "albedo"])
+pub fn integrator() -> Words<Integrator> {
+    Words::new(&Integrator::NAMES, &[])
+}
+
+pub fn f_stop(value: &str) -> Result<f64, String> {
+    let [least, most] = Lens::F_STOPS;
+    let inside = |n: &f64| (least..=most).contains(n) || *n == f64::INFINITY;
+    let wrong = || format!("must be an f-number from {least} to {most}, such as 2.8, or inf for a pinhole");
+    value.parse().ok().filter(inside).ok_or_else(wrong)
+}
+
+pub fn focus_distance(value: &str) -> Result<f64, String> {
+    let [least, most] = Lens::DISTANCES;
+    let inside = |n: &f64| (least..=most).contains(n) || *n == f64::INFINITY;
+    let wrong = || format!("must be metres from {least} to {most:e}, or inf");
+    value.parse().ok().filter(inside).ok_or_else(wrong)
+}
+
+pub fn aperture_blades(value: &str) -> Result<u32, String> {
+    let [least, most] = Lens::BLADES;
+    if value == "0" { Ok(0) } else { number(value, least, most).map_err(|allowed| allowed + ", or 0: round") }
+}
+
+pub fn sensor(value: &str) -> Result<f64, String> {
+    let [least, most] = Lens::SENSORS;
+    let inside = |n: &f64| (least..=most).contains(n);
+    value.parse().ok().filter(inside).ok_or_else(|| format!("must be millimetres from {least} to {most}, such as 36"))
 }
 
 pub fn exposure(value: &str) -> Result<Exposure, String> {

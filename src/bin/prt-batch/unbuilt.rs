@@ -19,17 +19,6 @@ const fn option(heading: &'static str, name: &'static str, value: &'static str, 
 }
 
 const OPTIONS: &[Unbuilt] = &[
-    option(
-        "Lens",
-        "f-stop",
-        "N",
-        "Thin lens of radius f/(2N) in metres, f = (sensor_h/2)/tan(yfov/2); with an orthographic camera an error \
-         [default: from the file, else pinhole]",
-    ),
-    option("Lens", "focus-distance", "M", "Metres along the axis [default: from the file]"),
-    option("Lens", "focus-on", "NODE", "Focus on a node in place of a distance"),
-    option("Lens", "aperture-blades", "N", "Corners of the aperture [default: from the file, else round]"),
-    option("Lens", "sensor", "MM", "The longer side of the image [default: from the file, else 36]"),
     option("Files", "transparent", "", "Alpha from coverage; background not in the beauty [default: off: alpha 1]"),
     option(
         "Animation",

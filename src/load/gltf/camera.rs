@@ -1,15 +1,15 @@
 //! Perspective and orthographic cameras.
 
 use super::node::{Rigid, rigid};
-use super::{Document, Loader, Result, extensions};
+use super::{Document, Loader, Result, extensions, lens};
 use crate::camera::{Camera, Projection};
 use glam::DMat4;
-use gltf::json::Index;
 use gltf::json::camera::{Camera as Json, Type};
 use gltf::json::validation::Checked;
+use gltf::json::{Extras, Index};
 use std::f64::consts::PI;
 
-/// Places the camera at `index` (found at `pointer`) by a node whose name and world transform are given.
+/// Places the camera at `index` (found at `pointer`) by a node of which the rest is given.
 pub(super) fn place(
     loader: &mut Loader,
     index: Index<Json>,
@@ -17,6 +17,7 @@ pub(super) fn place(
     world: DMat4,
     node_at: &str,
     node_name: &str,
+    node_extras: &Extras,
 ) -> Result<()> {
     let doc = loader.doc;
     let found = doc.item(&doc.root.cameras, index, pointer, "cameras")?;
@@ -37,8 +38,11 @@ pub(super) fn place(
         return Err(doc.error(node_at, "the camera has no direction", fix));
     };
     let name = found.name.clone().filter(|n| !n.is_empty()).unwrap_or_else(|| node_name.to_owned());
+    let (of_node, of_camera) = (lens::read(doc, node_extras, node_at)?, lens::read(doc, &found.extras, &at)?);
+    let lens = of_node.or(of_camera);
+    lens::check(doc, &lens, &projection, if of_node.f_stop.is_some() { node_at } else { &at })?;
     loader.cameras.insert(index.value());
-    loader.builder.add_camera(Camera { name, world_from_camera, projection });
+    loader.builder.add_camera(Camera { name, world_from_camera, projection, lens });
     Ok(())
 }
 

@@ -15,6 +15,7 @@ mod estimate;
 mod extensions;
 mod image;
 mod instancing;
+mod lens;
 mod light;
 mod locate;
 mod material;
@@ -68,6 +69,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<(Scene, LoadTimes)> {
         loader.builder.warn(warning);
     }
     node::walk(&mut loader, &chosen.roots)?;
+    if let Some(node) = &options.focus_on {
+        lens::focus_on(&mut loader, node)?;
+    }
     extensions::warn_ignored(&mut loader);
 
     let before = Instant::now();

@@ -242,7 +242,7 @@ fn place_camera(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Res
     let Some(index) = node.camera else { return Ok(()) };
     let at = format!("/nodes/{i}");
     let given = node.name.as_deref().unwrap_or_default();
-    camera::place(loader, index, &format!("{at}/camera"), world, &at, given)
+    camera::place(loader, index, &format!("{at}/camera"), world, &at, given, &node.extras)
 }
 
 /// The node's own transform.

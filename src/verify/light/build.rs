@@ -1,6 +1,6 @@
 //! Small scenes, built here.
 
-use crate::camera::{Camera, Projection};
+use crate::camera::{Camera, Lens, Projection};
 use crate::light::Light;
 use crate::material::Material;
 use crate::scene::{Instance, MaterialId, PlacedLight, SceneBuilder};
@@ -82,6 +82,7 @@ pub fn add_camera(builder: &mut SceneBuilder, eye: DVec3, target: DVec3, yfov: f
         name: String::from("camera"),
         world_from_camera: world_from_view(eye, target - eye),
         projection: Projection::Perspective { yfov, aspect_ratio: Some(1.0) },
+        lens: Lens::default(),
     });
 }
 

@@ -9,12 +9,13 @@ use prt::batch::{job::CameraChoice, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
-use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Layers};
+use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Integrator, Layers};
 use std::path::PathBuf;
 use std::time::Duration;
 
 const PICTURES: &str = "Pictures";
 const CAMERAS: &str = "Cameras";
+const LENS: &str = "Lens";
 const SAMPLING: &str = "Sampling";
 const LIGHT: &str = "Light";
 const FILES: &str = "Files";
@@ -94,6 +95,37 @@ pub struct FileArgs {
     #[arg(conflicts_with_all = ["camera_from", "camera"])]
     pub yfov: Option<f64>,
 
+    /// F-number of a thin lens, such as 2.8; inf: a pinhole [default: from the file, else a pinhole]
+    ///
+    /// The lens' radius is f/(2N) metres, with f = (h/2)/tan(yfov/2) and h the height of the image on the sensor. From
+    /// 1e-6 to 1e6. With an orthographic camera an error. See "The lens" below.
+    #[arg(long, value_name = "N", value_parser = parse::f_stop, allow_hyphen_values = true, help_heading = LENS)]
+    pub f_stop: Option<f64>,
+    /// Metres along the camera's axis to the plane that is sharp, or inf [default: from the file, else what is in the centre]
+    ///
+    /// Where nothing says it, the lens is focused on the first surface in the picture's centre, and a note says how far
+    /// that is. From 1e-6 to 1e18.
+    #[arg(long, value_name = "M", value_parser = parse::focus_distance, allow_hyphen_values = true)]
+    #[arg(help_heading = LENS)]
+    pub focus_distance: Option<f64>,
+    /// Focus on the place of this glTF node in place of a distance
+    ///
+    /// By its name; of several the first. A node that is not there is an error that lists the names most like it, as is
+    /// one that is not before the camera.
+    #[arg(long, value_name = "NODE", conflicts_with = "focus_distance", help_heading = LENS)]
+    pub focus_on: Option<String>,
+    /// Corners of the aperture, one of them at the top; 0: round [default: from the file, else round]
+    ///
+    /// From 3 to 64: a regular polygon with its corners on the circle of the lens' radius.
+    #[arg(long, value_name = "N", value_parser = parse::aperture_blades, allow_hyphen_values = true)]
+    #[arg(help_heading = LENS)]
+    pub aperture_blades: Option<u32>,
+    /// The longer side of the image on the sensor, millimetres [default: from the file, else 36]
+    ///
+    /// From 1e-3 to 1e6.
+    #[arg(long, value_name = "MM", value_parser = parse::sensor, allow_hyphen_values = true, help_heading = LENS)]
+    pub sensor: Option<f64>,
+
     /// Samples per pixel; the most, with a target or a time limit [default: 64; 2^20 with a target or a time limit]
     ///
     /// From 1 to 2^20.
@@ -124,9 +156,13 @@ pub struct FileArgs {
     #[arg(long, value_name = "N", default_value = "0", value_parser = parse::seed, help_heading = SAMPLING)]
     pub seed: u64,
     /// What is computed
+    ///
+    /// path: all light. direct: emitted and direct light, also in perfect mirrors and through clear glass. whitted: the
+    /// same without chance, lamps being points. ao: the share of the hemisphere that is open. normal: shading normals, as
+    /// 0.5 + 0.5 n. albedo: base colours. See "Integrators" below.
     #[arg(long, value_name = "NAME", default_value = "path", value_parser = parse::integrator())]
     #[arg(help_heading = SAMPLING)]
-    pub integrator: &'static str,
+    pub integrator: Integrator,
     /// Scatterings after the first; 0 = emitted and direct light only [default: unlimited]
     ///
     /// Roulette ends paths; a safety cap of 1024, which is also the most that may be given. The share of paths cut

@@ -4,6 +4,7 @@ use crate::term;
 use prt::batch::explain::{CameraPlan, Explanation, MemoryPlan, Prospect, explain};
 use prt::batch::fingerprint::StoppingRecord;
 use prt::batch::memory::amount;
+use prt::batch::report::Lens;
 use prt::batch::{BatchSettings, Stop, report};
 use prt::render::Considered;
 use serde::Serialize;
@@ -82,13 +83,21 @@ fn text(plan: &Explanation) -> String {
         let crop = plan.crop.map_or_else(String::new, |[x, y, w, h]| format!(", of it {w} x {h} at {x},{y}"));
         let paths = plan.paths.map_or_else(String::new, |paths| format!(", {} paths", grouped(paths)));
         let (spp, seed) = (plan.spp, plan.seed);
+        let integrator = match plan.integrator {
+            "path" => String::new(),
+            other => format!(", integrator {other}"),
+        };
         let most = if plan.stopping.is_some() { "at most " } else { "" };
-        lines.add("picture", format!("{width} x {height} pixels{crop}, {most}{spp} spp{paths}, seed {seed}"));
+        lines.add(
+            "picture",
+            format!("{width} x {height} pixels{crop}, {most}{spp} spp{paths}, seed {seed}{integrator}"),
+        );
         lines.list("ends", plan.stopping.iter().map(stopping_text));
         lines.add("scene", scene.to_string());
     }
     if let Some(camera) = &plan.camera {
         lines.add("camera", camera_text(camera));
+        lines.list("lens", plan.lens.iter().map(lens_text));
     }
     if let Some(used) = &plan.accel.used {
         let words = [Some(used), plan.accel.version.as_ref(), plan.accel.isa.as_ref()];
@@ -156,6 +165,13 @@ fn stopping_text(stopping: &StoppingRecord) -> String {
         .map(|limit| format!("its equal share is over of what is left of {} for all images", report::seconds(limit)));
     let ends: Vec<_> = error.into_iter().chain(time).chain(batch).collect();
     format!("when {}, or with the last sample", ends.join(", or "))
+}
+
+/// Such as `f/2.8, 24.5 mm, focused at 3.5 m, 6 blades`.
+fn lens_text(lens: &Lens) -> String {
+    let focus = lens.focus_distance_m.map_or_else(|| "infinity".to_owned(), |metres| format!("{metres} m"));
+    let blades = if lens.blades == 0 { "round".to_owned() } else { format!("{} blades", lens.blades) };
+    format!("f/{}, {:.1} mm, focused at {focus}, {blades}", lens.f_stop, lens.focal_length_mm)
 }
 
 fn camera_text(camera: &CameraPlan) -> String {
