@@ -86,18 +86,7 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
 #[test]
 fn unbuilt_options_and_commands_are_refused_by_name() {
     let root = folder();
-    for option in [
-        "--frames",
-        "--fps",
-        "--animation",
-        "--shutter",
-        "--shutter-position",
-        "--f-stop",
-        "--focus-distance",
-        "--focus-on",
-        "--aperture-blades",
-        "--sensor",
-    ] {
+    for option in ["--f-stop", "--focus-distance", "--focus-on", "--aperture-blades", "--sensor"] {
         refused(root.path(), &["a.gltf", option, "-1"], 2, &[&format!("{option} is not built yet")]);
         refused(root.path(), &["render", option, "1", "a.gltf"], 2, &[&format!("{option} is not built yet")]);
     }

@@ -77,7 +77,7 @@ pub(super) fn vector_area(scene: &Scene) -> DVec3 {
             })
             .sum()
     };
-    let meshes: Vec<DVec3> = scene.meshes.iter().map(of_mesh).collect();
+    let meshes: Vec<DVec3> = scene.meshes.iter().map(|mesh| of_mesh(mesh)).collect();
     let placed = |Instance { mesh, world_from_object, .. }: &Instance| {
         let linear = DMat3::from_mat4(*world_from_object);
         // Areas go by the cofactor matrix; a mirrored mesh keeps its front.

@@ -7,8 +7,9 @@ mod motion;
 mod source;
 
 pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
+pub(crate) use builder::Notes;
 pub use builder::SceneBuilder;
-pub(crate) use check::MAX_COORDINATE;
+pub(crate) use check::{Findings, MAX_COORDINATE, check_mesh};
 pub use motion::{Motion, Pose};
 pub use source::{SourceFile, Stamp};
 
@@ -18,6 +19,7 @@ use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Image, Texture};
 use glam::DMat4;
+use std::sync::Arc;
 
 /// A mesh placed in the world.
 #[derive(Clone, Debug)]
@@ -54,7 +56,9 @@ pub struct Skipped {
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangle meshes, object space.
-    pub meshes: Vec<Mesh>,
+    ///
+    /// Shared with the scenes of other moments where they do not change; so are images.
+    pub meshes: Vec<Arc<Mesh>>,
     /// Where they are.
     pub instances: Vec<Instance>,
     /// Surface descriptions.
@@ -62,7 +66,7 @@ pub struct Scene {
     /// Image + sampler pairs.
     pub textures: Vec<Texture>,
     /// Decoded pixels.
-    pub images: Vec<Image>,
+    pub images: Vec<Arc<Image>>,
     /// Punctual lights.
     pub lights: Vec<PlacedLight>,
     /// Light from all around, in world axes.
