@@ -75,7 +75,7 @@ fn wrong_values_name_option_value_and_what_is_allowed() {
         ("--memory", "8G", "KiB MiB GiB TiB"),
         ("--memory", "-5%", "from 1% to 100%"),
         ("--name", "{steam}", "{stem}, {parent}, {camera}"),
-        ("--name", "{frame}", "not built yet"),
+        ("--name", "{frame:4}", "written 01 to 09"),
         ("--name", "../{stem}", "below the output folder"),
     ] {
         refused(root.path(), &["a.gltf", option, value], 2, &["error: ", option, &format!("'{value}'"), allowed]);

@@ -229,3 +229,19 @@ fn the_plan_lists_frames_and_a_config_file_has_them_for_some_files() {
     assert_eq!(stems(&all), ["a.0001", "a.0002", "still"]);
     assert_eq!(all[0]["fingerprint"]["settings"]["shutter"], "0.25");
 }
+
+#[test]
+fn a_camera_that_the_file_lacks_stands_still_and_sees_the_whole_animation() {
+    let root = folder();
+    let mut seen: Value = serde_json::from_str(&scene()).unwrap();
+    seen["scenes"][0]["nodes"] = json!([0]);
+    fs::write(root.path().join("a.gltf"), seen.to_string()).unwrap();
+    let eye = |args: &[&str]| {
+        let output = prt_in(root.path(), &[&["a.gltf", "--explain", "--json"], args].concat());
+        let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
+        plan["images"][0]["camera"]["eye"].clone()
+    };
+    let (first, last) = (eye(&["--frames", "0"]), eye(&["--frames", "24"]));
+    assert_eq!(first, last);
+    assert_ne!(first, eye(&[]), "as written it is framed alone");
+}

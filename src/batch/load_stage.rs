@@ -10,9 +10,9 @@ use super::run::{Event, ImageId, Shared, names_of};
 use super::settings::{FileSettings, Task};
 use super::up_to_date::Why;
 use crate::error::LoadError;
-use crate::load::{LoadEstimate, LoadTimes, SceneSource, load};
-use crate::render::{Phase, Progress};
-use crate::scene::{Scene, SourceFile};
+use crate::load::{LoadEstimate, LoadTimes, Moment, SceneSource, load};
+use crate::render::{Phase, Progress, framing};
+use crate::scene::{Framing, Scene, SourceFile};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -85,7 +85,7 @@ impl Sources {
 struct Reading {
     task: usize,
     /// What the frames share, once one of them had to be read.
-    opened: Option<SceneSource>,
+    opened: Option<Opened>,
     /// Of the file, as its first frame told them: hashed once.
     sources: Option<Arc<Sources>>,
 }
@@ -211,17 +211,54 @@ impl LoadStage {
     }
 }
 
+/// A file whose frames are read.
+pub(super) struct Opened {
+    source: SceneSource,
+    /// For a camera that the file lacks, once a frame needed it.
+    framing: Option<Framing>,
+}
+
 /// The scene of a file in a frame; `opened` is the file as frames before have left it.
 pub(super) fn scene(
     path: &Path,
     settings: &FileSettings,
     frame: Option<u32>,
-    opened: &mut Option<SceneSource>,
+    opened: &mut Option<Opened>,
 ) -> Result<(Scene, LoadTimes), LoadError> {
     let (Some(frames), Some(frame)) = (&settings.frames, frame) else { return load(path, &settings.load) };
-    let source = match opened {
-        Some(source) => source,
-        None => opened.insert(SceneSource::open(path, &settings.load, &frames.animation)?),
+    let Opened { source, framing } = match opened {
+        Some(opened) => opened,
+        None => {
+            let source = SceneSource::open(path, &settings.load, &frames.animation)?;
+            opened.insert(Opened { source, framing: None })
+        }
     };
-    source.at(&frames.moment(frame))
+    let (mut scene, times) = source.at(&frames.moment(frame))?;
+    if scene.cameras.is_empty() {
+        scene.framing = Some(*framing.get_or_insert_with(|| framing_of(source)));
+    }
+    Ok((scene, times))
+}
+
+/// Into how many parts an animation is cut to see where things get.
+const LOOKS: u32 = 16;
+
+/// Around what is seen in the course of the whole animation: the camera must not move with it, and a frame must not depend
+/// on which others are asked for.
+fn framing_of(source: &mut SceneSource) -> Framing {
+    let seconds = source.seconds();
+    let looks = if seconds > 0.0 { LOOKS } else { 0 };
+    let mut all: Option<Framing> = None;
+    for k in 0..=looks {
+        let time = seconds * f64::from(k) / f64::from(LOOKS);
+        // What is wrong there is said by the frame that is there.
+        let Ok((scene, _)) = source.at(&Moment { time, shutter: Some(0.0), ..Moment::default() }) else { continue };
+        let found = framing(&scene);
+        let joined = all.get_or_insert(found);
+        joined.bounds = match (joined.bounds, found.bounds) {
+            (Some((low, high)), Some((lower, higher))) => Some((low.min(lower), high.max(higher))),
+            (one, other) => one.or(other),
+        };
+    }
+    all.unwrap_or_default()
 }

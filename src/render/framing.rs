@@ -1,8 +1,9 @@
 //! A camera for a scene without one: where it stands so that the whole scene is in the picture and can be recognised.
 //! The policy is stated in docs/conventions.md, "Framing".
 
+use super::boxes::Boxes;
 use crate::camera::{Camera, Projection};
-use crate::scene::{Instance, Scene};
+use crate::scene::{Framing, Instance, Scene};
 use crate::shape::placement::cofactor;
 use glam::{DMat3, DMat4, DVec3};
 
@@ -63,6 +64,11 @@ fn direction(extents: DVec3, vector_area: DVec3) -> DVec3 {
         return DVec3::new(1.0, 0.3, 0.35);
     }
     DVec3::new(0.35, 0.3, 1.0)
+}
+
+/// What a camera for `scene` alone is framed on.
+pub fn framing(scene: &Scene) -> Framing {
+    Framing { bounds: Boxes::of(scene).scene, vector_area: vector_area(scene) }
 }
 
 /// Sum over all triangles of area times normal, m^2, world space: null for closed surfaces, across a flat one.

@@ -21,7 +21,7 @@ mod tracer;
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use features::features;
 pub use frame::{pool, render, render_prepared};
-pub use framing::FRAMING_YFOV;
+pub use framing::{FRAMING_YFOV, framing};
 pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};
 pub use prepare::{PlacedReport, Prepared, build_accel, geometry, prepare, prepare_placing, prepare_with};

@@ -18,7 +18,7 @@ use crate::light::{Environment, Light};
 use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Image, Texture};
-use glam::DMat4;
+use glam::{DMat4, DVec3};
 use std::sync::Arc;
 
 /// A mesh placed in the world.
@@ -41,6 +41,15 @@ pub struct PlacedLight {
     pub world_from_light: DMat4,
     /// The node's name, for messages.
     pub name: String,
+}
+
+/// What a camera is framed on that a file does not give: of an animation the same for every frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Framing {
+    /// World space, metres, lowest and highest corner; `None` = nothing to see.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Sum over all triangles of area times normal, m^2, world space: which side flat things show.
+    pub vector_area: DVec3,
 }
 
 /// Something in the file that the picture does not need and that was not read.
@@ -73,6 +82,8 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// Cameras with their place.
     pub cameras: Vec<Camera>,
+    /// What a camera is framed on where there is none; `None` = on the scene as it is.
+    pub framing: Option<Framing>,
     /// What of it moves while the shutter is open; empty for a scene at rest.
     pub motion: Motion,
     /// Which scene of the file this is.
