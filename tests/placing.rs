@@ -314,7 +314,7 @@ fn surfaces_count_alike_placed_and_merged_where_it_is_decided_about_the_studio()
     }
     let lamp = scenes::lamp(0.0, 5.0);
     scene.materials.push(lamp);
-    scene.meshes.push(flat_quad(0.5, MaterialId(1)));
+    scene.meshes.push(flat_quad(0.5, MaterialId(1)).into());
     let mesh = prt::scene::MeshId(1);
     scene.instances.push(Instance { mesh, world_from_object: DMat4::IDENTITY, name: String::from("lamp") });
     let [merged, placed] = [Choice::Never, Choice::Always]

@@ -55,7 +55,7 @@ struct Snapshot {
 
 /// Something that may move.
 enum Thing<'a> {
-    Instance(u32, usize, DMat4, [DVec3; 8]),
+    Instance(u32, usize, Box<(DMat4, [DVec3; 8])>),
     Camera(u32, usize),
     Light(u32, usize),
     Form(&'a Form),
@@ -124,7 +124,7 @@ impl Shutter<'_> {
             if let Some((node, below, mesh)) = *place
                 && is_moved(node)
             {
-                things.push(Thing::Instance(i as u32, node, below, corners(builder.mesh(mesh))));
+                things.push(Thing::Instance(i as u32, node, Box::new((below, corners(builder.mesh(mesh))))));
             }
         }
         let of_nodes = |nodes: &[usize]| -> Vec<(u32, usize)> {
@@ -229,8 +229,8 @@ impl Shutter<'_> {
             let later = || (1..=pieces).filter_map(|i| known.get(&(i * TICKS / pieces)));
             let worlds = |node: &usize| later().filter_map(|s| s.worlds.get(node).copied()).collect::<Vec<DMat4>>();
             match thing {
-                Thing::Instance(i, node, below, _) => {
-                    motion.instances.insert(*i, worlds(node).into_iter().map(|world| world * *below).collect());
+                Thing::Instance(i, node, placed) => {
+                    motion.instances.insert(*i, worlds(node).into_iter().map(|world| world * placed.0).collect());
                 }
                 Thing::Camera(i, node) => _ = motion.cameras.insert(*i, worlds(node).iter().map(frame).collect()),
                 Thing::Light(i, node) => _ = motion.lights.insert(*i, worlds(node).iter().map(frame).collect()),
@@ -278,7 +278,8 @@ impl Thing<'_> {
     /// Points whose paths tell how it moves, in groups that are judged each by its own size.
     fn probes(&self, snapshot: &Snapshot) -> Vec<Vec<DVec3>> {
         match self {
-            Thing::Instance(_, node, below, corners) => {
+            Thing::Instance(_, node, placed) => {
+                let (below, corners) = &**placed;
                 let world = snapshot.worlds.get(node).copied().unwrap_or_default() * *below;
                 vec![corners.iter().map(|&c| world.transform_point3(c)).collect()]
             }

@@ -229,7 +229,7 @@ mod tests {
                 let found = DQuat::from_array(curve.at(share).try_into().unwrap());
                 assert!((found.length() - 1.0).abs() < 1e-6);
                 assert!(
-                    found.dot(expected).abs() > 1.0 - 1e-12,
+                    found.normalize().dot(expected).abs() > 1.0 - 1e-12,
                     "{from} to {to} at {share}: {found:?} is not {expected:?}"
                 );
             }
