@@ -129,7 +129,8 @@ fn blended_sheets_let_their_share_of_light_through() {
 fn sheets_in_one_place_each_stop_their_share() {
     let mut scene = floor_under(&[black(AlphaMode::Blend, 0.3), black(AlphaMode::Blend, 0.3)], 0.3);
     // The second sheet's height becomes the first one's: 49 % pass, not 70 %.
-    scene.meshes[2].positions = scene.meshes[1].positions.clone();
+    let positions = scene.meshes[1].positions.clone();
+    std::sync::Arc::make_mut(&mut scene.meshes[2]).positions = positions;
     assert_shows("coinciding sheets", &scene, 0.49 * in_the_sun(), 0.015, 1.03);
     // A camera in the sun above them sees the floor in 49 % of its rays, in the light that 49 % reach.
     scene.cameras[0] = camera_above(3.0, POINT_VIEW);
@@ -278,7 +279,7 @@ fn culled_backs_let_camera_rays_pass_and_still_cast_shadows() {
     }
     let mut scene = floor_under(&[ceiling], 0.0);
     // The sheet's front is up, so turn it over.
-    scene.meshes[1].indices = vec![[0, 2, 1], [0, 3, 2]];
+    std::sync::Arc::make_mut(&mut scene.meshes[1]).indices = vec![[0, 2, 1], [0, 3, 2]];
     scene.cameras[0] = camera_above(3.0, POINT_VIEW);
     let settings = RenderSettings { cull_backfaces: true, ..settings(4, 4, 0) };
     assert!(shoot(&scene, &settings).pixels.iter().flatten().all(|&x| x == 0.0));
@@ -290,7 +291,7 @@ fn culled_backs_stop_light_that_scatters() {
     let mut scene =
         floor_under_lamp(scenes::lamp(0.0, 5.0), &[Material { double_sided: false, ..scenes::lambert(0.0) }]);
     // The lamp shines down.
-    scene.meshes[1].indices = vec![[0, 2, 1], [0, 3, 2]];
+    std::sync::Arc::make_mut(&mut scene.meshes[1]).indices = vec![[0, 2, 1], [0, 3, 2]];
     let settings = RenderSettings { cull_backfaces: true, ..settings(8, 64, 0) };
     assert!(shoot(&scene, &settings).pixels.iter().flatten().all(|&x| x == 0.0));
 }
@@ -398,7 +399,7 @@ fn textures_read_the_set_of_coordinates_and_the_transform_that_they_name() {
         add_sheet(&mut builder, 0.0, 1.0, material);
         builder.add_camera(camera_above(2.0, POINT_VIEW));
         let mut scene = builder.finish();
-        scene.meshes[0].uv_sets = vec![left.clone(), right.clone()];
+        std::sync::Arc::make_mut(&mut scene.meshes[0]).uv_sets = vec![left.clone(), right.clone()];
         for pixel in shoot(&scene, &settings(4, 4, 0)).pixels {
             assert!(pixel.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{uv_set} {transform:?}: {pixel:?}");
         }

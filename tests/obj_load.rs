@@ -20,7 +20,7 @@ const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 /// Corners of all triangles.
 fn triangles(scene: &Scene) -> Vec<[[f32; 3]; 3]> {
     let of = |m: &prt::shape::Mesh| m.indices.iter().map(|t| t.map(|i| m.positions[i as usize])).collect::<Vec<_>>();
-    scene.meshes.iter().flat_map(of).collect()
+    scene.meshes.iter().flat_map(|mesh| of(mesh)).collect()
 }
 
 fn material(mtl: &str) -> Material {
@@ -97,7 +97,7 @@ fn names_that_are_not_utf8_are_latin1() {
 fn smoothing_groups_average_and_off_is_flat() {
     // A roof of two squares at a right angle along the edge 1-2.
     let roof = "v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nv 1 -1 0\nv 0 -1 0\n";
-    let load = |faces: &str| load_obj(format!("{roof}{faces}")).unwrap().meshes[0].clone();
+    let load = |faces: &str| (*load_obj(format!("{roof}{faces}")).unwrap().meshes[0]).clone();
     let smooth = load("s 1\nf 1 2 3 4\nf 6 5 2 1\n");
     assert_eq!(smooth.positions.len(), 6, "vertices on the edge are shared");
     let h = 0.5_f32.sqrt();

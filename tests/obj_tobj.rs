@@ -21,7 +21,7 @@ fn by_tobj(path: &Path) -> Option<Vec<[[f32; 3]; 3]>> {
 fn by_us(path: &Path) -> Option<Vec<[[f32; 3]; 3]>> {
     let scene = load(path, &LoadOptions::default()).ok()?.0;
     let of = |m: &prt::shape::Mesh| m.indices.iter().map(|t| t.map(|i| m.positions[i as usize])).collect::<Vec<_>>();
-    Some(scene.meshes.iter().flat_map(of).collect())
+    Some(scene.meshes.iter().flat_map(|mesh| of(mesh)).collect())
 }
 
 /// Only triangles, none twice in different places.

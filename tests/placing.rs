@@ -104,7 +104,7 @@ fn inst_01_placed_normal_maps_look_like_merged_ones_also_where_they_are_mirrored
     };
     let mut scene = scene(mapped);
     // The balls get tangents along their circles of latitude.
-    for mesh in scene.meshes.iter_mut().filter(|mesh| mesh.tangents.is_none()) {
+    for mesh in scene.meshes.iter_mut().map(std::sync::Arc::make_mut).filter(|mesh| mesh.tangents.is_none()) {
         let tangent = |n: &[f32; 3]| match Vec3::new(n[2], 0.0, -n[0]).try_normalize() {
             Some(t) => [t.x, t.y, t.z, 1.0],
             None => [1.0, 0.0, 0.0, 1.0],
@@ -314,7 +314,7 @@ fn surfaces_count_alike_placed_and_merged_where_it_is_decided_about_the_studio()
     }
     let lamp = scenes::lamp(0.0, 5.0);
     scene.materials.push(lamp);
-    scene.meshes.push(flat_quad(0.5, MaterialId(1)));
+    scene.meshes.push(flat_quad(0.5, MaterialId(1)).into());
     let mesh = prt::scene::MeshId(1);
     scene.instances.push(Instance { mesh, world_from_object: DMat4::IDENTITY, name: String::from("lamp") });
     let [merged, placed] = [Choice::Never, Choice::Always]

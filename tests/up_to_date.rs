@@ -96,6 +96,7 @@ impl Shot {
             origin: &self.origin,
             environment: self.environment.as_ref(),
             camera: self.camera,
+            frame: None,
             batch_time_limit: self.batch_time_limit,
         })
     }

@@ -33,15 +33,16 @@ impl Elsewhere {
         }
     }
 
-    /// An image of the task, with its camera's place.
+    /// An image of the task, with its camera's place and its frame.
     pub fn wanted<'a>(
         &'a self,
         Task { input, settings }: &'a Task,
         camera: usize,
+        frame: Option<u32>,
         batch_time_limit: Option<Duration>,
     ) -> Wanted<'a> {
         let environment = self.environment.as_ref().map(|environment| &environment.origin);
-        Wanted { input: &input.path, settings, origin: &self.origin, environment, camera, batch_time_limit }
+        Wanted { input: &input.path, settings, origin: &self.origin, environment, camera, frame, batch_time_limit }
     }
 
     /// Names of the cameras, if they are not the task's own.

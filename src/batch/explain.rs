@@ -6,6 +6,7 @@ use super::describe::{accel_name, default_light_name, lens_notes};
 use super::elsewhere::Elsewhere;
 use super::fingerprint::StoppingRecord;
 use super::job::Plan;
+use super::load_stage::scene as scene_of;
 use super::memory::{MemoryBudget, need};
 use super::panics::guarded;
 use super::report::{Accel, DefaultLight, Lens, Outputs};
@@ -16,14 +17,14 @@ use super::up_to_date::check;
 use super::view::CameraSource;
 use crate::camera::{Camera, Projection};
 use crate::light::Light;
-use crate::load::{LoadEstimate, LoadTimes, load};
+use crate::load::{LoadEstimate, LoadTimes};
 use crate::render::memory::{MemoryEstimate, texel_bytes};
 use crate::render::{self, Considered, Prepared, RenderSettings, features, pilot, prepare};
 use crate::scene::{Scene, Skipped};
 use crate::texture::{Image, Texels};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What would come of an image.
@@ -54,6 +55,7 @@ pub struct Explanation {
     pub camera: Option<CameraPlan>,
     /// Null for a pinhole.
     pub lens: Option<Lens>,
+    pub frame: Option<u32>,
     pub outputs: Outputs,
     pub width: Option<u32>,
     pub height: Option<u32>,
@@ -215,7 +217,8 @@ pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> R
     let budget = MemoryBudget::new(settings.memory);
     let mut explained = Explained { inputs: settings.tasks.len(), ..Explained::default() };
     for (task, elsewhere) in elsewhere.iter().enumerate() {
-        let one = File { run: settings, plan: &plan, task, elsewhere, hashes: &hashes, budget };
+        let frame = plan.frames[task].first().copied().flatten();
+        let one = File { run: settings, plan: &plan, task, elsewhere, hashes: &hashes, budget, frame };
         let mut count = |explanation: Explanation| {
             explained.images += 1;
             explained.failing += usize::from(explanation.prospect == Prospect::Fail);
@@ -223,7 +226,11 @@ pub fn explain(settings: &BatchSettings, told: &mut dyn FnMut(Explanation)) -> R
         };
         match pool.install(|| guarded(|| one.load())) {
             Ok((scene, times, reading)) => {
-                pool.install(|| one.images(&scene, times, reading)).into_iter().for_each(&mut count);
+                let first = pool.install(|| one.images(&scene, times, reading));
+                let later: Vec<Explanation> = (plan.frames[task].iter().skip(1))
+                    .flat_map(|&frame| File { frame, ..one }.like(&first, &names_of(&scene.cameras)))
+                    .collect();
+                first.into_iter().chain(later).for_each(&mut count);
             }
             Err(problem) => {
                 explained.bad_inputs += 1;
@@ -246,6 +253,7 @@ struct File<'a> {
     elsewhere: &'a Elsewhere,
     hashes: &'a HashCache,
     budget: MemoryBudget,
+    frame: Option<u32>,
 }
 
 impl File<'_> {
@@ -258,8 +266,12 @@ impl File<'_> {
         let (input, render) = (&self.run.tasks[self.task].input, &self.settings().render);
         Explanation {
             input: input.path.display().to_string(),
+            frame: self.frame,
             spp: render.spp,
-            stopping: self.elsewhere.wanted(&self.run.tasks[self.task], 0, self.run.batch_time_limit).stopping(),
+            stopping: self
+                .elsewhere
+                .wanted(&self.run.tasks[self.task], 0, self.frame, self.run.batch_time_limit)
+                .stopping(),
             seed: render.seed,
             integrator: render.integrator.name(),
             crop: render.crop.map(|c| [c.x, c.y, c.width, c.height]),
@@ -275,7 +287,8 @@ impl File<'_> {
             return Err(problem.to_string());
         }
         let reading = self.budget.check_loading(&input.path, settings)?;
-        let (mut scene, times) = load(&input.path, &settings.load).map_err(|error| error.to_string())?;
+        let (mut scene, times) =
+            scene_of(&input.path, settings, self.frame, &mut None).map_err(|error| error.to_string())?;
         self.elsewhere.replace_in(&mut scene, settings);
         Ok((scene, times, reading))
     }
@@ -291,7 +304,7 @@ impl File<'_> {
                 return vec![Explanation { prospect: Prospect::Fail, problem, ..self.blank() }];
             }
         };
-        let outputs = self.plan.namings[self.task].outputs(&names, &chosen);
+        let outputs = self.plan.namings[self.task].outputs(&names, &chosen, self.frame);
         let mut prepared = None;
         let mut all = Vec::with_capacity(chosen.len());
         for (nth, (&camera, output)) in chosen.iter().zip(outputs).enumerate() {
@@ -300,12 +313,7 @@ impl File<'_> {
             // As in reports: the file is read for its first image.
             let times = if nth == 0 { times } else { LoadTimes::default() };
             (plan.seconds.load, plan.seconds.decode) = (Some(times.load), Some(times.decode));
-            let path = |extension: &str| self.run.path(&output, extension).display().to_string();
-            plan.outputs = Outputs {
-                exr: settings.files.exr.then(|| path("exr")),
-                png: settings.files.png.then(|| path("png")),
-                json: Some(path("json")),
-            };
+            plan.outputs = self.outputs(&output);
             if self.plan.owners.get(&output).is_some_and(|owner| *owner != self.task) {
                 let output = output.display();
                 fail(&mut plan, format!("{output} belongs to another input; use --name"));
@@ -318,9 +326,30 @@ impl File<'_> {
         all
     }
 
+    /// The plans of this frame as those of the file's first one: what a later frame takes is not tried out.
+    fn like(&self, first: &[Explanation], names: &[String]) -> Vec<Explanation> {
+        let chosen = self.settings().cameras.select(names).unwrap_or_default();
+        let outputs = self.plan.namings[self.task].outputs(names, &chosen, self.frame);
+        let of = |((plan, &camera), output): ((&Explanation, &usize), PathBuf)| {
+            let mut plan = Explanation { frame: self.frame, outputs: self.outputs(&output), ..plan.clone() };
+            if plan.prospect == Prospect::Keep {
+                plan.prospect = Prospect::Render;
+            }
+            self.look_for_earlier(camera, &mut plan);
+            plan
+        };
+        first.iter().zip(&chosen).zip(outputs).map(of).collect()
+    }
+
+    fn outputs(&self, output: &Path) -> Outputs {
+        let files = self.settings().files;
+        let path = |extension: &str| self.run.path(output, extension).display().to_string();
+        Outputs { exr: files.exr.then(|| path("exr")), png: files.png.then(|| path("png")), json: Some(path("json")) }
+    }
+
     /// Whether an earlier run left what this one would write.
     fn look_for_earlier(&self, camera: usize, plan: &mut Explanation) {
-        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera, self.run.batch_time_limit);
+        let wanted = self.elsewhere.wanted(&self.run.tasks[self.task], camera, self.frame, self.run.batch_time_limit);
         let json = match &plan.outputs.json {
             Some(json) if plan.prospect == Prospect::Render && !self.run.force => json,
             _ => return,
@@ -342,7 +371,7 @@ impl File<'_> {
         plan.skipped.clone_from(&scene.skipped);
         (plan.meshes, plan.instances) = (Some(scene.meshes.len()), Some(scene.instances.len()));
         plan.materials = Some(scene.materials.len());
-        plan.textures = scene.images.iter().map(texture).collect();
+        plan.textures = scene.images.iter().map(|image| texture(image)).collect();
         plan.texture_bytes = plan.textures.iter().map(|texture| texture.bytes).sum();
         let (file, placed) =
             (scene.meshes.iter().map(|mesh| mesh.indices.len() as u64).sum(), scene.triangle_count() as u64);
@@ -359,7 +388,8 @@ impl File<'_> {
         plan: &mut Explanation,
     ) -> Result<(), String> {
         let settings = self.settings();
-        let mut render = RenderSettings { focus_point: scene.focus, threads: None, ..settings.render.clone() };
+        let frame = self.frame.unwrap_or(settings.render.frame);
+        let mut render = RenderSettings { frame, focus_point: scene.focus, threads: None, ..settings.render.clone() };
         (render.width, render.height) = size_for(settings.size, scene, camera);
         (plan.width, plan.height) = (Some(render.width), Some(render.height));
         plan.notes.extend(aspect_note(settings.size, scene, camera));

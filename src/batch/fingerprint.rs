@@ -7,6 +7,7 @@
 use super::content::{Content, HashCache, InputRecord, content_of};
 use super::develop::Tone;
 use super::environment::EnvironmentOrigin;
+use super::frames::Frames;
 use super::picture::FileOptions;
 use super::settings::FileSettings;
 use super::size::PictureSize;
@@ -82,6 +83,8 @@ pub struct Wanted<'a> {
     pub environment: Option<&'a EnvironmentOrigin>,
     /// Which of them, by its place.
     pub camera: usize,
+    /// Which frame of the animation, if `settings.frames` are asked for.
+    pub frame: Option<u32>,
     /// Of the run.
     pub batch_time_limit: Option<Duration>,
 }
@@ -154,11 +157,20 @@ impl Wanted<'_> {
     /// field that is added to one of them must be put here, or named as one that changes no pixel. With `spp` samples a
     /// pixel, which is what is asked for unless something else ends sampling, and how they are spread unevenly.
     pub fn pixel_settings(&self, spp: u32, adaptive: Option<&str>) -> Settings {
-        let Self { input, settings, origin, environment, camera, batch_time_limit: _ } = *self;
+        let Self { input, settings, origin, environment, camera, frame: wanted_frame, batch_time_limit: _ } = *self;
         // Names of files change no pixel; which cameras, which environment and from where is said by `origin`, `camera` and
         // `environment`; `files` comes after the pixels.
-        let FileSettings { name: _, size, camera_source: _, cameras: _, environment: _, load, render, files: _ } =
-            settings;
+        let FileSettings {
+            name: _,
+            size,
+            camera_source: _,
+            cameras: _,
+            environment: _,
+            frames,
+            load,
+            render,
+            files: _,
+        } = settings;
         let mut lines = Settings::new();
         let mut set = |key: &str, value: String| _ = lines.insert(key.into(), value);
         set(
@@ -246,7 +258,18 @@ impl Wanted<'_> {
             set("adaptive", adaptive.into());
         }
         set("seed", seed.to_string());
-        set("frame", frame.to_string());
+        set("frame", wanted_frame.unwrap_or(*frame).to_string());
+        // Only where there are any: pictures of files as written have the fingerprints that they had before.
+        if let (Some(frames), Some(_)) = (frames, wanted_frame) {
+            // The frame's number says which of them.
+            let Frames { choice: _, fps, animation, shutter, position } = frames;
+            set("fps", fps.to_string());
+            set("animation", animation.to_string());
+            set("shutter", shutter.map_or_else(|| "of the file".into(), |share| share.to_string()));
+            if *shutter != Some(0.0) {
+                set("shutter-position", name(position));
+            }
+        }
         set("max-bounces", max_bounces.map_or_else(|| "unlimited".into(), |most| most.to_string()));
         // Named only where they are on: pictures without them have the fingerprints that they had before there were any.
         if let Some(most) = clamp {

@@ -53,24 +53,33 @@ pub struct Naming {
     stem: String,
     parent: String,
     template: Option<NameTemplate>,
+    /// Several frames are asked for.
+    has_frames: bool,
 }
 
 impl Naming {
     /// Output path without extension, below the output folder, of the camera called `label`; `several` cameras of the
     /// file are rendered.
-    pub fn output(&self, label: &str, several: bool) -> PathBuf {
+    pub fn output(&self, label: &str, several: bool, frame: Option<u32>) -> PathBuf {
+        let number = frame.unwrap_or(0);
         let name = match &self.template {
-            Some(template) => template.fill(&NameFields { stem: &self.stem, parent: &self.parent, camera: label }),
-            None if several => format!("{}.{label}", self.stem),
-            None => self.stem.clone(),
+            Some(template) => {
+                let fields = NameFields { stem: &self.stem, parent: &self.parent, camera: label, frame: number };
+                template.fill(&fields)
+            }
+            None => {
+                let camera = if several { format!(".{label}") } else { String::new() };
+                let frame = if self.has_frames { format!(".{number:04}") } else { String::new() };
+                format!("{}{camera}{frame}", self.stem)
+            }
         };
         self.folder.join(name)
     }
 
-    /// Outputs of the cameras `chosen` out of those called `names`.
-    pub fn outputs(&self, names: &[String], chosen: &[usize]) -> Vec<PathBuf> {
+    /// Outputs of the cameras `chosen` out of those called `names`, in one frame.
+    pub fn outputs(&self, names: &[String], chosen: &[usize], frame: Option<u32>) -> Vec<PathBuf> {
         let labels = labels_of(names);
-        chosen.iter().map(|&i| self.output(&labels[i], chosen.len() > 1)).collect()
+        chosen.iter().map(|&i| self.output(&labels[i], chosen.len() > 1, frame)).collect()
     }
 }
 
@@ -86,6 +95,8 @@ pub struct Plan {
     pub namings: Vec<Naming>,
     /// For each task, the names of its cameras as far as they are known without loading: to be checked again.
     pub cameras: Vec<Vec<String>>,
+    /// For each task, its frames: one that is none where the file is rendered as written.
+    pub frames: Vec<Vec<Option<u32>>>,
     /// Output path without extension to task.
     pub owners: HashMap<PathBuf, usize>,
 }
@@ -103,8 +114,9 @@ pub fn plan(tasks: &[Task], elsewhere: &[Option<Vec<String>>]) -> Result<Plan, S
             (None, None) => peek::camera_names(&input.path, settings.load.scene.as_deref()).unwrap_or_default(),
         })
         .collect();
-    let named = try_plan(tasks, None, &cameras).map_err(|clash| {
-        const CANDIDATES: [&str; 6] = [
+    let frames: Vec<Vec<Option<u32>>> = tasks.iter().map(frames_of).collect();
+    let named = try_plan(tasks, None, &cameras, &frames).map_err(|clash| {
+        const CANDIDATES: [&str; 10] = [
             // By camera only after by folder: names of cameras differ by luck between files.
             "{parent}-{stem}",
             "{stem}.{camera}",
@@ -112,21 +124,39 @@ pub fn plan(tasks: &[Task], elsewhere: &[Option<Vec<String>>]) -> Result<Plan, S
             "{stem}-render",
             "{parent}/{stem}",
             "{parent}/{stem}.{camera}",
+            "{stem}.{frame:04}",
+            "{parent}-{stem}.{frame:04}",
+            "{stem}.{camera}.{frame:04}",
+            "{parent}/{stem}.{camera}.{frame:04}",
         ];
         let works = |candidate: &&&str| {
             let candidate = NameTemplate::parse(candidate).expect("the candidates are valid templates");
-            try_plan(tasks, Some(&candidate), &cameras).is_ok()
+            try_plan(tasks, Some(&candidate), &cameras, &frames).is_ok()
         };
         match CANDIDATES.iter().find(works) {
             Some(name) => format!("{clash}\n  Use --name '{name}' to tell them apart."),
             None => format!("{clash}\n  Render them in separate runs with different --out."),
         }
     });
-    Ok(Plan { cameras, ..named? })
+    Ok(Plan { cameras, frames, ..named? })
+}
+
+/// The frames of a task.
+fn frames_of(Task { input, settings }: &Task) -> Vec<Option<u32>> {
+    match (&settings.frames, &input.problem) {
+        (Some(frames), None) => frames.numbers(&input.path, &settings.load).into_iter().map(Some).collect(),
+        (Some(_), Some(_)) => vec![Some(0)],
+        (None, _) => vec![None],
+    }
 }
 
 /// With the template `instead` in place of the tasks' own, if there is one.
-fn try_plan(tasks: &[Task], instead: Option<&NameTemplate>, names: &[Vec<String>]) -> Result<Plan, String> {
+fn try_plan(
+    tasks: &[Task],
+    instead: Option<&NameTemplate>,
+    names: &[Vec<String>],
+    frames: &[Vec<Option<u32>>],
+) -> Result<Plan, String> {
     let mut plan = Plan::default();
     // What decides about a plain stem: the first type of a stem in a folder. By hash, as a batch may have 10^5 files.
     let mut first_types: HashMap<(&Path, Option<&Path>, Option<&OsStr>), usize> = HashMap::new();
@@ -139,16 +169,20 @@ fn try_plan(tasks: &[Task], instead: Option<&NameTemplate>, names: &[Vec<String>
     for (index, Task { input, settings }) in tasks.iter().enumerate() {
         let is_shadowed =
             first_types.get(&stem_key(input)).is_some_and(|first| Some(*first) < extension_rank(&input.path));
-        let naming = naming(input, is_shadowed, instead.or(settings.name.as_ref()));
+        let has_frames = frames[index].len() > 1;
+        let naming = Naming { has_frames, ..naming(input, is_shadowed, instead.or(settings.name.as_ref())) };
         if input.problem.is_none() {
             // A camera that is not there fails this file later; it writes under one name all the same.
             let chosen = settings.cameras.select(&names[index]).unwrap_or_else(|_| vec![0]);
-            for output in naming.outputs(&names[index], &chosen) {
+            let of_frame = |frame: &Option<u32>| naming.outputs(&names[index], &chosen, *frame);
+            for output in frames[index].iter().flat_map(of_frame) {
                 check_reserved(&output, &input.path)?;
                 if let Some(other) = plan.owners.insert(output.clone(), index) {
                     let (output, path) = (output.display(), input.path.display());
                     return Err(if other == index {
-                        format!("{path}: several cameras would be written to one name, {output}")
+                        let what = if has_frames && chosen.len() == 1 { "frames" } else { "cameras" };
+                        let what = if has_frames && chosen.len() > 1 { "cameras or frames" } else { what };
+                        format!("{path}: several {what} would be written to one name, {output}")
                     } else {
                         let other = tasks[other].input.path.display();
                         format!("{other} and {path} would both be written to {output}")
@@ -183,7 +217,13 @@ fn naming(input: &Input, is_shadowed: bool, template: Option<&NameTemplate>) -> 
     let stem = text(if is_shadowed { input.path.file_name() } else { input.path.file_stem() });
     let parent = std::path::absolute(&input.path).unwrap_or_else(|_| input.path.clone());
     let parent = parent.parent().map(|p| p.canonicalize().unwrap_or_else(|_| p.to_owned())).unwrap_or_default();
-    Naming { folder: input.folder.clone(), stem, parent: text(parent.file_name()), template: template.cloned() }
+    Naming {
+        folder: input.folder.clone(),
+        stem,
+        parent: text(parent.file_name()),
+        template: template.cloned(),
+        has_frames: false,
+    }
 }
 
 #[cfg(test)]
@@ -199,10 +239,13 @@ mod tests {
 
     fn outputs(paths: &[&str], template: Option<&str>, cameras: &[&[&str]]) -> Result<Vec<String>, String> {
         let names: Vec<Vec<String>> = cameras.iter().map(|c| c.iter().map(|n| n.to_string()).collect()).collect();
-        let plan = try_plan(&tasks(paths, template), None, &names)?;
+        let plan = try_plan(&tasks(paths, template), None, &names, &vec![vec![None]; paths.len()])?;
         let outputs = plan.namings.iter().zip(&names);
         let all = |names: &[String]| CameraChoice::All.select(names).unwrap();
-        Ok(outputs.flat_map(|(n, names)| n.outputs(names, &all(names))).map(|p| p.to_str().unwrap().into()).collect())
+        Ok(outputs
+            .flat_map(|(n, names)| n.outputs(names, &all(names), None))
+            .map(|p| p.to_str().unwrap().into())
+            .collect())
     }
 
     #[test]

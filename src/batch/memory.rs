@@ -137,7 +137,12 @@ impl MemoryBudget {
     /// # Errors
     /// See [`MemoryBudget::check`]; the text names the file.
     pub(super) fn check_loading(&self, path: &Path, settings: &FileSettings) -> Result<LoadEstimate, String> {
-        let reading = load::estimate(path, &settings.load).unwrap_or_default();
+        let mut reading = load::estimate(path, &settings.load).unwrap_or_default();
+        if settings.frames.is_some() {
+            // From the first frame to the last.
+            reading.bytes = reading.bytes.saturating_add(reading.unmoved);
+            reading.left_over = reading.left_over.saturating_add(reading.unmoved);
+        }
         let program = of_picture(&settings.render, encoded(settings)).program;
         let need = MemoryEstimate { program, loading: reading.bytes, ..MemoryEstimate::default() };
         self.check(&need, None).map_err(|why| format!("{}: {why}", path.display()))?;

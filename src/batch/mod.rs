@@ -12,6 +12,7 @@ mod elsewhere;
 mod environment;
 pub mod explain;
 pub mod fingerprint;
+mod frames;
 pub mod host;
 pub mod html;
 pub mod input;
@@ -36,6 +37,7 @@ mod write_stage;
 
 pub use develop::{Developed, Tone, develop};
 pub use environment::{EnvironmentOrigin, EnvironmentSource};
+pub use frames::{FrameChoice, Frames};
 pub use picture::FileOptions;
 pub use run::{ImageId, Observer, Outcome, Started, Stop, run};
 pub use settings::{BatchSettings, FileSettings, Task};

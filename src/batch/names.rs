@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path};
 
-/// A checked name template of `{stem}`, `{parent}` and `{camera}`; `/` makes sub-folders.
+/// A checked name template of `{stem}`, `{parent}`, `{camera}` and `{frame}`; `/` makes sub-folders.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NameTemplate(Vec<Part>);
 
@@ -12,6 +12,8 @@ enum Part {
     Stem,
     Parent,
     Camera,
+    /// With so many digits at least.
+    Frame(usize),
 }
 
 /// What a template's placeholders stand for.
@@ -23,6 +25,8 @@ pub struct NameFields<'a> {
     pub parent: &'a str,
     /// The camera, made fit for a file name.
     pub camera: &'a str,
+    /// The frame's number; 0 where no frames are asked for.
+    pub frame: u32,
 }
 
 impl NameTemplate {
@@ -31,7 +35,7 @@ impl NameTemplate {
     /// # Errors
     /// What is wrong with it and what is allowed.
     pub fn parse(template: &str) -> Result<Self, String> {
-        const ALLOWED: &str = "allowed: text with {stem}, {parent}, {camera}";
+        const ALLOWED: &str = "allowed: text with {stem}, {parent}, {camera}, {frame} or {frame:04}";
         let mut parts = Vec::new();
         let mut rest = template;
         while let Some(open) = rest.find(['{', '}']) {
@@ -44,8 +48,15 @@ impl NameTemplate {
                 "stem" => Part::Stem,
                 "parent" => Part::Parent,
                 "camera" => Part::Camera,
-                name if name == "frame" || name.starts_with("frame:") => {
-                    return Err(format!("{{{name}}} is not built yet; {ALLOWED}"));
+                "frame" => Part::Frame(1),
+                name if name.starts_with("frame:") => {
+                    let digits = name["frame:".len()..].strip_prefix('0').and_then(|n| n.parse().ok());
+                    let digits = digits.filter(|n| (1..=9).contains(n));
+                    Part::Frame(
+                        digits.ok_or_else(|| {
+                            format!("{{{name}}}: the number of digits is written 01 to 09; {ALLOWED}")
+                        })?,
+                    )
                 }
                 name => return Err(format!("there is no {{{name}}}; {ALLOWED}")),
             });
@@ -55,7 +66,7 @@ impl NameTemplate {
             parts.push(Part::Text(rest.into()));
         }
         let template = Self(parts);
-        let probe = template.fill(&NameFields { stem: "s", parent: "p", camera: "c" });
+        let probe = template.fill(&NameFields { stem: "s", parent: "p", camera: "c", frame: 0 });
         let inside = Path::new(&probe).components().all(|c| matches!(c, Component::Normal(_)));
         if probe.is_empty() || probe.ends_with('/') || !inside || probe.contains('\0') {
             return Err(format!("must be a name below the output folder; {ALLOWED}"));
@@ -70,6 +81,7 @@ impl NameTemplate {
             Part::Stem => fields.stem.into(),
             Part::Parent => fields.parent.into(),
             Part::Camera => fields.camera.into(),
+            Part::Frame(digits) => format!("{:0digits$}", fields.frame),
         };
         self.0.iter().map(text).collect()
     }
@@ -115,7 +127,7 @@ pub fn camera_labels(names: &[String]) -> Vec<String> {
 mod tests {
     use super::*;
 
-    const FIELDS: NameFields<'_> = NameFields { stem: "lamp", parent: "rooms", camera: "Main" };
+    const FIELDS: NameFields<'_> = NameFields { stem: "lamp", parent: "rooms", camera: "Main", frame: 7 };
 
     #[test]
     fn placeholders_are_filled() {
@@ -124,6 +136,8 @@ mod tests {
             ("{parent}/{stem}.{camera}", "rooms/lamp.Main"),
             ("x", "x"),
             ("{stem}-final", "lamp-final"),
+            ("{stem}/{frame:04}", "lamp/0007"),
+            ("{frame}_{frame:01}", "7_7"),
         ] {
             assert_eq!(NameTemplate::parse(template).unwrap().fill(&FIELDS), name);
         }
@@ -133,7 +147,9 @@ mod tests {
     fn bad_templates_say_what_is_allowed() {
         for (template, says) in [
             ("{steam}", "there is no {steam}"),
-            ("{stem}{frame:04}", "{frame:04} is not built yet"),
+            ("{stem}{frame:4}", "{frame:4}: the number of digits"),
+            ("{stem}{frame:}", "{frame:}: the number of digits"),
+            ("{stem}{frame:012}", "{frame:012}: the number of digits"),
             ("{stem", "brace"),
             ("stem}", "brace"),
             ("", "must be a name"),

@@ -17,9 +17,11 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
-/// A file that was read, or why not.
+/// A file that was read, as it is in one frame, or why not.
 pub(super) struct Loaded {
     pub task: usize,
+    /// Of its animation; `None`: it is as written.
+    pub frame: Option<u32>,
     /// Of its first image.
     pub id: ImageId,
     /// Of its first image.
@@ -57,10 +59,10 @@ impl RenderStage {
 
     /// All images of one file.
     fn file(&self, loaded: Loaded, to_write: &SyncSender<Made>) -> Result<(), Ended> {
-        let Loaded { task, id, progress, contents, seconds } = loaded;
+        let Loaded { task, frame, id, progress, contents, seconds } = loaded;
         let Task { input, settings } = &self.shared.settings.tasks[task];
         let naming = &self.shared.plan.namings[task];
-        let image = || Box::new(blank(&input.path, settings));
+        let image = || Box::new(ImageReport { frame, ..blank(&input.path, settings) });
         let SceneFile { scene, sources, times, names, chosen, why, reading, grant } = match contents {
             Ok(Contents::Scene(file)) => *file,
             Ok(Contents::Kept(images)) => {
@@ -78,12 +80,12 @@ impl RenderStage {
                 fail(&mut image, message);
                 image.seconds.total = seconds;
                 // A pattern or a folder has no name of its own to write under.
-                let output = input.problem.is_none().then(|| naming.output("0", false));
+                let output = input.problem.is_none().then(|| naming.output("0", false, frame));
                 return self
                     .hand_on(Made { task, id, progress, image, output, picture: None, is_bad_input: true }, to_write);
             }
         };
-        let outputs = naming.outputs(&names, &chosen);
+        let outputs = naming.outputs(&names, &chosen, frame);
         let mut first = Some((id, progress, seconds, times.load, times.decode));
         for (&camera, output) in chosen.iter().zip(outputs) {
             let (id, progress, before, load, decode) = first.take().unwrap_or_else(|| {
@@ -109,7 +111,7 @@ impl RenderStage {
                 // Of several images some may be up to date.
                 if chosen.len() > 1
                     && !self.shared.settings.force
-                    && let Ok(image) = self.shared.kept(task, camera, &output)
+                    && let Ok(image) = self.shared.kept(task, camera, frame, &output)
                 {
                     made.image = Box::new(image);
                     self.hand_on(made, to_write)?;
@@ -117,12 +119,13 @@ impl RenderStage {
                 }
                 made.output = Some(output);
                 match self.image(task, &scene, reading, camera, &made.progress, &mut made.image) {
-                    Ok(frame) => {
-                        made.picture = frame.map(|(frame, settings)| {
+                    Ok(rendered) => {
+                        made.picture = rendered.map(|(rendered, settings)| {
                             Box::new(Picture {
-                                frame,
+                                rendered,
                                 settings,
                                 camera,
+                                frame,
                                 sources: Arc::clone(&sources),
                                 _grant: grant.clone(),
                             })
@@ -156,7 +159,7 @@ impl RenderStage {
             return Ok(None);
         }
         let file = &*self.shared.settings.tasks[task].settings;
-        let mut settings = sized(file, scene, camera);
+        let mut settings = sized(file, scene, camera, image.frame);
         settings.stopping.batch_until = self.shared.shares.until(Instant::now());
         (image.width, image.height) = (Some(settings.width), Some(settings.height));
         image.notes.extend(aspect_note(file.size, scene, camera));
@@ -193,10 +196,11 @@ impl RenderStage {
     }
 }
 
-/// The settings of a camera's picture.
-pub(super) fn sized(file: &FileSettings, scene: &Scene, camera: usize) -> RenderSettings {
+/// The settings of a camera's picture in a frame.
+pub(super) fn sized(file: &FileSettings, scene: &Scene, camera: usize, frame: Option<u32>) -> RenderSettings {
     let (width, height) = size_for(file.size, scene, camera);
-    RenderSettings { width, height, focus_point: scene.focus, threads: None, ..file.render.clone() }
+    let frame = frame.unwrap_or(file.render.frame);
+    RenderSettings { width, height, frame, focus_point: scene.focus, threads: None, ..file.render.clone() }
 }
 
 /// The run is to end.

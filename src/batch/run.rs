@@ -145,15 +145,15 @@ impl Shared {
         (id, progress)
     }
 
-    /// What is asked for of a task's camera.
-    pub fn wanted(&self, task: usize, camera: usize) -> Wanted<'_> {
-        self.elsewhere[task].wanted(&self.settings.tasks[task], camera, self.settings.batch_time_limit)
+    /// What is asked for of a task's camera in a frame.
+    pub fn wanted(&self, task: usize, camera: usize, frame: Option<u32>) -> Wanted<'_> {
+        self.elsewhere[task].wanted(&self.settings.tasks[task], camera, frame, self.settings.batch_time_limit)
     }
 
     /// The image as an earlier run left it, if that is what this run would write; else why not.
-    pub fn kept(&self, task: usize, camera: usize, output: &Path) -> Result<ImageReport, Why> {
+    pub fn kept(&self, task: usize, camera: usize, frame: Option<u32>, output: &Path) -> Result<ImageReport, Why> {
         let json = self.settings.path(output, "json");
-        let Kept { report, outputs } = check(&json, &self.wanted(task, camera), &self.hashes)?;
+        let Kept { report, outputs } = check(&json, &self.wanted(task, camera, frame), &self.hashes)?;
         let path = |kind: &str| {
             let of_kind = outputs.iter().find(|path| path.extension().is_some_and(|e| e == kind));
             of_kind.map(|path| path.display().to_string())
@@ -305,23 +305,27 @@ fn batch_report(shared: &Shared, images: Vec<ImageReport>, started: SystemTime, 
     }
 }
 
-/// For each task the images that will come of it, as far as that is known, by their cameras' names in reports.
-fn jobs(tasks: &[Task], plan: &Plan) -> Vec<Vec<Option<String>>> {
-    let of = |(task, names): (&Task, &Vec<String>)| {
+/// A frame and a camera by its name in reports.
+type Job = (Option<u32>, Option<String>);
+
+/// For each task the images that will come of it, as far as that is known.
+fn jobs(tasks: &[Task], plan: &Plan) -> Vec<Vec<Job>> {
+    let of = |((task, names), frames): ((&Task, &Vec<String>), &Vec<Option<u32>>)| {
         let chosen = task.settings.cameras.select(names).unwrap_or_else(|_| vec![0]);
-        chosen.into_iter().map(|camera| reported_name(names, camera)).collect()
+        let of_frame = |&frame: &Option<u32>| chosen.iter().map(move |&camera| (frame, reported_name(names, camera)));
+        frames.iter().flat_map(of_frame).collect()
     };
-    tasks.iter().zip(&plan.cameras).map(of).collect()
+    tasks.iter().zip(&plan.cameras).zip(&plan.frames).map(of).collect()
 }
 
 /// Reports of the images that were not done because the run ended, each with its task.
-fn left_out(tasks: &[Task], jobs: &[Vec<Option<String>>], done: &[(usize, ImageReport)]) -> Vec<(usize, ImageReport)> {
+fn left_out(tasks: &[Task], jobs: &[Vec<Job>], done: &[(usize, ImageReport)]) -> Vec<(usize, ImageReport)> {
     let mut finished = vec![0; tasks.len()];
     done.iter().for_each(|(task, _)| finished[*task] += 1);
     let of_task = |(index, Task { input, settings }): (usize, &Task)| {
-        let interrupted = |camera: &Option<String>| {
-            let status = Status::Interrupted;
-            (index, ImageReport { status, camera: camera.clone(), ..blank(&input.path, settings) })
+        let interrupted = |(frame, camera): &Job| {
+            let (status, frame) = (Status::Interrupted, *frame);
+            (index, ImageReport { status, frame, camera: camera.clone(), ..blank(&input.path, settings) })
         };
         jobs[index].iter().skip(finished[index]).map(interrupted).collect::<Vec<_>>()
     };

@@ -1,6 +1,7 @@
 //! What a run is asked to do: settings of files, of the run, and the pairs of the two that it works off.
 
 use super::environment::EnvironmentSource;
+use super::frames::Frames;
 use super::input::Input;
 use super::job::CameraChoice;
 use super::memory::MemoryLimit;
@@ -28,6 +29,8 @@ pub struct FileSettings {
     pub cameras: CameraChoice,
     /// What lights it from all around in place of an environment of its own.
     pub environment: Option<EnvironmentSource>,
+    /// Which frames of its animation; `None` = the file as written.
+    pub frames: Option<Frames>,
     /// How the file is read.
     pub load: LoadOptions,
     /// Everything else about the pictures; width and height are set from `size` for each, threads belong to the run.

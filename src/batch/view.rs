@@ -113,6 +113,7 @@ impl CameraSource {
             scene.skipped.push(crate::scene::Skipped { what: "cameras".into(), why });
         }
         scene.cameras = cameras.to_vec();
+        scene.motion.cameras.clear();
     }
 
     /// As typed, for messages.

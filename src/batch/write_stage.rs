@@ -33,11 +33,12 @@ pub(super) struct Made {
 
 /// A picture to write.
 pub(super) struct Picture {
-    pub frame: Frame,
+    pub rendered: Frame,
     /// With which it was rendered.
     pub settings: RenderSettings,
     /// Its place among the scene's.
     pub camera: usize,
+    pub frame: Option<u32>,
     pub sources: Arc<Sources>,
     /// Held until it is written.
     pub _grant: Option<Arc<Grant>>,
@@ -109,12 +110,13 @@ impl WriteStage {
         output: &Path,
         image: &mut ImageReport,
     ) -> Result<(), WriteError> {
-        let Picture { frame, settings, camera, sources, _grant } = picture;
+        let Picture { rendered, settings, camera, frame, sources, _grant } = picture;
         let files = self.shared.settings.tasks[task].settings.files;
         match sources.records() {
             Ok(inputs) => {
-                let wanted = self.shared.wanted(task, *camera);
-                image.fingerprint = Some(Fingerprint::new(&wanted, inputs.clone(), frame.spp, frame.stats.spread));
+                let wanted = self.shared.wanted(task, *camera, *frame);
+                image.fingerprint =
+                    Some(Fingerprint::new(&wanted, inputs.clone(), rendered.spp, rendered.stats.spread));
             }
             Err(changed) => {
                 image.warnings.push(format!("{changed}; this picture will not be taken for up to date"));
@@ -122,7 +124,7 @@ impl WriteStage {
         }
         if files.exr {
             let fingerprint = image.fingerprint.as_ref().map(|f| f.pixels.as_str());
-            match self.shared.beside.install(|| exr_bytes(frame, settings, files.format, fingerprint)) {
+            match self.shared.beside.install(|| exr_bytes(rendered, settings, files.format, fingerprint)) {
                 Ok((bytes, clipped)) => {
                     image.clipped_pixels = clipped;
                     image.warnings.extend(clipped.filter(|clipped| *clipped > 0).map(clipped_warning));
@@ -135,8 +137,8 @@ impl WriteStage {
             }
         }
         if files.png {
-            let size = [frame.window.width, frame.window.height];
-            let developed = develop(&frame.pixels, None, size, files.tone);
+            let size = [rendered.window.width, rendered.window.height];
+            let developed = develop(&rendered.pixels, None, size, files.tone);
             image.exposure = Some(ExposureReport::new(files.tone.exposure, developed.exposure));
             image.notes.extend(developed.notes);
             image.warnings.extend(developed.warnings);

@@ -127,7 +127,8 @@ fn camera_cones_have_the_solid_angle_of_their_pixel() {
 
         #[inline(always)]
         fn run<L: Lanes>(self) -> [f64; 2] {
-            let (_, direction) = self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]), [L::F::zero(); 2], L::F::zero());
+            let (_, direction) =
+                self.0.ray::<L>(L::F::splat(self.1[0]), L::F::splat(self.1[1]), [L::F::zero(); 2], L::F::zero());
             let (width, spread) = self.0.cone::<L>(direction);
             [width, spread].map(|v| f64::from(v.first()))
         }

@@ -10,7 +10,9 @@ use std::path::Path;
 pub struct LoadEstimate {
     /// Bytes at most at any time while it is read, its scene included.
     pub bytes: u64,
-    /// Of these, what the allocator keeps when it has been read: what was many small pieces.
+    /// Bytes besides while the file is read for several moments of an animation: vertices before anything moves them.
+    pub unmoved: u64,
+    /// Of `bytes`, what the allocator keeps when it has been read: what was many small pieces.
     pub left_over: u64,
 }
 

@@ -4,12 +4,16 @@ mod environment;
 mod estimate;
 mod folders;
 pub mod gltf;
+mod moment;
 pub mod obj;
+mod source;
 mod tangents;
 
 pub use environment::load_environment;
 pub use estimate::{LoadEstimate, estimate};
 pub use folders::Folders;
+pub use moment::{AnimationChoice, Moment, ShutterPosition};
+pub use source::{SceneSource, animation_seconds};
 
 use crate::camera::Camera;
 use crate::error::{LoadError, SourceLoc};

@@ -28,6 +28,15 @@ pub(super) struct TooManyTriangles(pub usize);
 /// normals get flat ones first. Vertices are split where corners differ, and only there; unused vertices go.
 /// Each tangent is of length 1 and across its normal, also where the coordinates say nothing: any direction then.
 pub(super) fn generate(mesh: &mut Mesh, uv_set: usize, transform: Option<UvTransform>) -> Result<(), TooManyTriangles> {
+    generate_splitting(mesh, uv_set, transform).1
+}
+
+/// As [`generate`]; also of each new vertex the one that it was.
+pub(super) fn generate_splitting(
+    mesh: &mut Mesh,
+    uv_set: usize,
+    transform: Option<UvTransform>,
+) -> (Vec<u32>, Result<(), TooManyTriangles>) {
     let uvs = mesh.uv_sets.get(uv_set).map(|uvs| transformed(uvs, transform));
     let corner_normals: Vec<Vec3> = corner_normals(mesh);
     let mut result = Ok(());
@@ -38,8 +47,7 @@ pub(super) fn generate(mesh: &mut Mesh, uv_set: usize, transform: Option<UvTrans
         result = corners.run();
     }
     let found = corner_normals.iter().zip(tangents).map(|(&n, t)| across(n, t.unwrap_or_default()).0).collect();
-    split(mesh, &corner_normals, found);
-    result
+    (split(mesh, &corner_normals, found), result)
 }
 
 /// Replaces tangents that are not finite, zero, or along the normal by any across it, and makes handedness +1 or -1.
@@ -183,8 +191,9 @@ impl Geometry for Corners<'_> {
     }
 }
 
-/// Gives each corner its normal and tangent; corners of one vertex that agree share a vertex again.
-fn split(mesh: &mut Mesh, normals: &[Vec3], tangents: Vec<[f32; 4]>) {
+/// Gives each corner its normal and tangent; corners of one vertex that agree share a vertex again. Of each new vertex the
+/// one that it was.
+fn split(mesh: &mut Mesh, normals: &[Vec3], tangents: Vec<[f32; 4]>) -> Vec<u32> {
     // Of each old vertex the newest of its new ones, and of each new one the one before it.
     let mut newest: Vec<Option<u32>> = vec![None; mesh.positions.len()];
     let mut before: Vec<Option<u32>> = Vec::with_capacity(mesh.positions.len());
@@ -226,6 +235,7 @@ fn split(mesh: &mut Mesh, normals: &[Vec3], tangents: Vec<[f32; 4]>) {
         None => corner.iter().map(|&c| normals[c as usize].to_array()).collect(),
     });
     mesh.tangents = Some(pick(&tangents, &corner));
+    old
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub struct Boxes {
 impl Boxes {
     /// Looks at every mesh of `scene`, and at every instance.
     pub fn of(scene: &Scene) -> Self {
-        let of_meshes = scene.meshes.par_iter().map(box_of_mesh).collect();
+        let of_meshes = scene.meshes.par_iter().map(|mesh| box_of_mesh(mesh)).collect();
         let mut first = vec![0; scene.meshes.len() + 1];
         for instance in &scene.instances {
             first[instance.mesh.index() + 1] += 1;

@@ -75,7 +75,7 @@ mod tests {
         let image = Image { width: texels.len() as u32, height: 1, texels, name: String::new() };
         let (wrap_u, wrap_v) = (Wrap::Repeat, Wrap::Repeat);
         let texture = Texture { image: ImageId(0), wrap_u, wrap_v, filter: Filter::Nearest };
-        Scene { images: vec![image], textures: vec![texture], ..Scene::default() }
+        Scene { images: vec![image.into()], textures: vec![texture], ..Scene::default() }
     }
 
     fn glowing() -> Material {

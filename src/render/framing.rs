@@ -1,9 +1,10 @@
 //! A camera for a scene without one: where it stands so that the whole scene is in the picture and can be recognised.
 //! The policy is stated in docs/conventions.md, "Framing".
 
+use super::boxes::Boxes;
 use super::shapes;
 use crate::camera::{Camera, Lens, Projection};
-use crate::scene::{Instance, Scene};
+use crate::scene::{Framing, Instance, Scene};
 use crate::shape::placement::cofactor;
 use glam::{DMat3, DMat4, DVec3};
 
@@ -67,6 +68,11 @@ fn direction(extents: DVec3, vector_area: DVec3) -> DVec3 {
     DVec3::new(0.35, 0.3, 1.0)
 }
 
+/// What a camera for `scene` alone is framed on.
+pub fn framing(scene: &Scene) -> Framing {
+    Framing { bounds: Boxes::of(scene).scene, vector_area: vector_area(scene) }
+}
+
 /// Sum over all triangles of area times normal, m^2, world space: null for closed surfaces, across a flat one.
 pub(super) fn vector_area(scene: &Scene) -> DVec3 {
     let of_mesh = |mesh: &crate::shape::Mesh| -> DVec3 {
@@ -79,7 +85,7 @@ pub(super) fn vector_area(scene: &Scene) -> DVec3 {
             })
             .sum()
     };
-    let meshes: Vec<DVec3> = scene.meshes.iter().map(of_mesh).collect();
+    let meshes: Vec<DVec3> = scene.meshes.iter().map(|mesh| of_mesh(mesh)).collect();
     let placed = |Instance { mesh, world_from_object, .. }: &Instance| {
         let linear = DMat3::from_mat4(*world_from_object);
         // Areas go by the cofactor matrix; a mirrored mesh keeps its front.

@@ -140,7 +140,7 @@ pub fn estimate(scene: &Scene, settings: &RenderSettings, files: Encoded) -> Mem
 
 /// What a scene holds, bytes.
 pub fn scene_bytes(scene: &Scene) -> u64 {
-    let meshes: u64 = scene.meshes.iter().map(mesh_bytes).sum();
+    let meshes: u64 = scene.meshes.iter().map(|mesh| mesh_bytes(mesh)).sum();
     let images: u64 = scene.images.iter().map(|image| texel_bytes(&image.texels)).sum();
     let names: usize = scene.instances.iter().map(|instance| instance.name.len()).sum();
     let instances = size_of::<Instance>() * scene.instances.len() + names;

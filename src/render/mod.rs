@@ -25,7 +25,7 @@ mod tracer;
 pub use default_light::{DefaultLightReport, Emitted, LEAST_EMITTED};
 pub use features::features;
 pub use frame::{pool, render, render_prepared};
-pub use framing::FRAMING_YFOV;
+pub use framing::{FRAMING_YFOV, framing};
 pub use lens::{LensReport, lens};
 pub use pilot::{Pilot, pilot};
 pub use placing::{Choice, Considered};

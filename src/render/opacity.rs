@@ -83,8 +83,12 @@ mod tests {
             material: MaterialId(0),
             name: String::new(),
         };
-        let scene =
-            Scene { images: vec![image], textures: vec![texture], materials: vec![material], ..Scene::default() };
+        let scene = Scene {
+            images: vec![image.into()],
+            textures: vec![texture],
+            materials: vec![material],
+            ..Scene::default()
+        };
         Opacities::new(&scene).let_rays_pass(&scene, &mesh)
     }
 

@@ -4,7 +4,7 @@ use super::framing::{framing_camera, vector_area};
 use super::{CropWindow, Prepared, RenderSettings};
 use crate::camera::{Camera, CameraRays, PixelFilter, ThinLens};
 use crate::integrator::{Integrator, PathTracer};
-use crate::scene::Scene;
+use crate::scene::{Framing, Scene};
 use glam::DMat4;
 use simd::Level;
 use std::borrow::Cow;
@@ -16,7 +16,9 @@ use std::borrow::Cow;
 pub fn camera<'s>(scene: &'s Scene, index: usize, prepared: &Prepared, settings: &RenderSettings) -> Cow<'s, Camera> {
     if scene.cameras.is_empty() {
         let aspect = f64::from(settings.width) / f64::from(settings.height);
-        Cow::Owned(framing_camera(prepared.bounds, vector_area(scene), aspect))
+        let own = || Framing { bounds: prepared.bounds, vector_area: vector_area(scene) };
+        let Framing { bounds, vector_area } = scene.framing.unwrap_or_else(own);
+        Cow::Owned(framing_camera(bounds, vector_area, aspect))
     } else {
         Cow::Borrowed(&scene.cameras[index])
     }

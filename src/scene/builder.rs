@@ -1,5 +1,6 @@
 //! Where loaders put what they read; [`SceneBuilder::finish`] checks it once for all of them.
 
+use super::check::Findings;
 use super::{
     ImageId, Instance, MaterialId, MeshId, Motion, PlacedLight, PlacedShape, Scene, Skipped, SourceFile, TextureId,
 };
@@ -8,11 +9,22 @@ use crate::light::Environment;
 use crate::material::Material;
 use crate::shape::Mesh;
 use crate::texture::{Channels, Image, Texture};
+use std::sync::Arc;
 
 /// A scene under construction.
 #[derive(Debug, Default)]
 pub struct SceneBuilder {
     scene: Scene,
+    /// Of each mesh what its check found, where that was done before.
+    checked: Vec<Option<Findings>>,
+}
+
+/// What was noted while something was read, to be noted again where that is used again.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Notes {
+    warnings: Vec<String>,
+    losses: Vec<String>,
+    skipped: Vec<Skipped>,
 }
 
 macro_rules! add {
@@ -25,10 +37,19 @@ macro_rules! add {
     };
 }
 
+impl Notes {
+    /// Adds what was noted later.
+    pub(crate) fn append(&mut self, mut later: Self) {
+        self.warnings.append(&mut later.warnings);
+        self.losses.append(&mut later.losses);
+        self.skipped.append(&mut later.skipped);
+    }
+}
+
 impl SceneBuilder {
     /// An empty scene with the file's scene index.
     pub fn new(index: usize) -> Self {
-        Self { scene: Scene { index, ..Scene::default() } }
+        Self { scene: Scene { index, ..Scene::default() }, checked: Vec::new() }
     }
 
     /// The index given to [`SceneBuilder::new`].
@@ -36,10 +57,38 @@ impl SceneBuilder {
         self.scene.index
     }
 
-    add!(add_mesh, meshes, Mesh, MeshId);
     add!(add_material, materials, Material, MaterialId);
     add!(add_texture, textures, Texture, TextureId);
-    add!(add_image, images, Image, ImageId);
+
+    /// Adds to `meshes`; the id is its place there.
+    pub fn add_mesh(&mut self, mesh: Mesh) -> MeshId {
+        self.push_mesh(Arc::new(mesh), None)
+    }
+
+    /// Adds a mesh that [`check_mesh`](super::check_mesh) has seen, perhaps for another scene.
+    pub(crate) fn add_checked_mesh(&mut self, mesh: Arc<Mesh>, findings: Findings) -> MeshId {
+        self.push_mesh(mesh, Some(findings))
+    }
+
+    fn push_mesh(&mut self, mesh: Arc<Mesh>, findings: Option<Findings>) -> MeshId {
+        self.scene.meshes.push(mesh);
+        self.checked.push(findings);
+        MeshId((self.scene.meshes.len() - 1) as u32)
+    }
+
+    /// A mesh that was added.
+    ///
+    /// # Panics
+    /// When the id is of another builder.
+    pub(crate) fn mesh(&self, id: MeshId) -> &Mesh {
+        &self.scene.meshes[id.index()]
+    }
+
+    /// Adds to `images`; the id is its place there.
+    pub fn add_image(&mut self, image: impl Into<Arc<Image>>) -> ImageId {
+        self.scene.images.push(image.into());
+        ImageId((self.scene.images.len() - 1) as u32)
+    }
 
     /// The channels that the materials read of each image, by its id; images beyond the end are read by none.
     pub fn channels(&self) -> Vec<Channels> {
@@ -104,6 +153,32 @@ impl SceneBuilder {
         self.scene.sources = sources;
     }
 
+    /// What moves, by the places of things in this builder.
+    pub fn set_motion(&mut self, motion: Motion) {
+        self.scene.motion = motion;
+    }
+
+    /// What is there so far, for [`SceneBuilder::notes_since`].
+    pub(crate) fn note_counts(&self) -> [usize; 3] {
+        [self.scene.warnings.len(), self.scene.losses.len(), self.scene.skipped.len()]
+    }
+
+    /// What was noted since then.
+    pub(crate) fn notes_since(&self, [warnings, losses, skipped]: [usize; 3]) -> Notes {
+        Notes {
+            warnings: self.scene.warnings[warnings..].to_vec(),
+            losses: self.scene.losses[losses..].to_vec(),
+            skipped: self.scene.skipped[skipped..].to_vec(),
+        }
+    }
+
+    /// Notes it once more.
+    pub(crate) fn note_again(&mut self, notes: &Notes) {
+        self.scene.warnings.extend_from_slice(&notes.warnings);
+        self.scene.losses.extend_from_slice(&notes.losses);
+        self.scene.skipped.extend_from_slice(&notes.skipped);
+    }
+
     /// Notes something the user should know.
     pub fn warn(&mut self, warning: impl Into<String>) {
         self.scene.warnings.push(warning.into());
@@ -126,7 +201,7 @@ impl SceneBuilder {
     /// # Panics
     /// When a loader handed out an id that does not exist: a bug in that loader, not in its input.
     pub fn finish(mut self) -> Scene {
-        super::check::check(&mut self.scene);
+        super::check::check(&mut self.scene, self.checked);
         self.scene
     }
 }

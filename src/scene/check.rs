@@ -3,8 +3,9 @@
 use super::{Scene, motion};
 use crate::math::MAX_UV_SETS;
 use crate::shape::Mesh;
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Coordinates beyond this are dropped: Embree ignores such triangles without a word
 /// (`rtcCommitScene`: "|value| > 1.844e18"), so both backends must.
@@ -17,8 +18,8 @@ const PIECE: usize = 1 << 14;
 const NAMES_SHOWN: usize = 3;
 
 /// What was wrong with one mesh.
-#[derive(Default)]
-struct Found {
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Findings {
     /// Triangles with a vertex that cannot be used.
     unusable: usize,
     /// Triangles without area.
@@ -27,17 +28,30 @@ struct Found {
     colors: usize,
 }
 
+impl Findings {
+    /// Whether nothing had to be changed.
+    pub(crate) fn is_clean(&self) -> bool {
+        let Self { unusable, flat, uvs, colors } = *self;
+        unusable + flat + uvs + colors == 0
+    }
+}
+
 /// Checks ids, drops unusable triangles and instances, cleans attributes, with a counted warning for each kind.
 ///
 /// # Panics
 /// When an id, a vertex index or the length of an attribute is wrong: a bug of the loader.
-pub(super) fn check(scene: &mut Scene) {
-    check_ids(scene);
+///
+/// Of the meshes that were checked before, `checked` has what was found; others have `None` there, or nothing.
+pub(super) fn check(scene: &mut Scene, mut checked: Vec<Option<Findings>>) {
+    checked.resize(scene.meshes.len(), None);
+    check_ids(scene, &checked);
     motion::clean(scene);
-    let changes = &scene.motion.meshes;
-    let check_mesh = |(i, mesh)| check_mesh(mesh, changes.contains_key(&(i as u32)));
-    let found: Vec<Found> = scene.meshes.par_iter_mut().enumerate().map(check_mesh).collect();
-    type Count = fn(&Found) -> usize;
+    let moving: Vec<bool> = (0..scene.meshes.len()).map(|i| scene.motion.meshes.contains_key(&(i as u32))).collect();
+    let check = |((mesh, checked), &moves): ((&mut Arc<Mesh>, Option<Findings>), &bool)| {
+        checked.unwrap_or_else(|| check_form(Arc::make_mut(mesh), moves))
+    };
+    let found: Vec<Findings> = scene.meshes.par_iter_mut().zip(checked).zip(&moving).map(check).collect();
+    type Count = fn(&Findings) -> usize;
     // What has no area would not be seen anyway; all else is lost.
     let kinds: [(Count, bool, &str); 4] = [
         (|f| f.unusable, true, "triangles dropped: a vertex is not finite or is beyond 1.844e18"),
@@ -73,10 +87,15 @@ fn clean_environment(scene: &mut Scene) {
     }
 }
 
-/// `changes` its form: what has no area when the shutter opens may have some later.
-fn check_mesh(mesh: &mut Mesh, changes: bool) -> Found {
-    let [unusable, flat] = drop_triangles(mesh, changes);
-    Found { unusable, flat, uvs: clean_uvs(mesh), colors: clean_colors(mesh) }
+/// Drops unusable triangles and cleans attributes.
+pub(crate) fn check_mesh(mesh: &mut Mesh) -> Findings {
+    check_form(mesh, false)
+}
+
+/// What `moves` may have an area later.
+fn check_form(mesh: &mut Mesh, moves: bool) -> Findings {
+    let [unusable, flat] = drop_triangles(mesh, !moves);
+    Findings { unusable, flat, uvs: clean_uvs(mesh), colors: clean_colors(mesh) }
 }
 
 /// Drops instances whose transform squashes everything to a line or a point, so that no triangle has an area: a scale
@@ -84,23 +103,24 @@ fn check_mesh(mesh: &mut Mesh, changes: bool) -> Found {
 /// plane stays: triangles in that plane can be seen, and `render::prepare` drops the others one by one.
 fn drop_instances(scene: &mut Scene) {
     let mut squashed = Tally::default();
-    let Scene { instances, motion, .. } = scene;
-    let moving = std::mem::take(&mut motion.instances);
-    let (mut i, mut kept) = (0, 0);
-    instances.retain(|instance| {
-        let later = moving.get(&i);
-        i += 1;
-        let m = DMat3::from_mat4(instance.world_from_object);
+    let has_area = |world_from_object: &DMat4| {
+        let m = DMat3::from_mat4(*world_from_object);
         let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-        let has_area = [x.cross(y), y.cross(z), z.cross(x)].iter().any(|c| *c != DVec3::ZERO);
-        // What moves may be squashed at one time only.
-        let keeps = has_area || later.is_some();
-        squashed.add(usize::from(!keeps), &instance.name);
-        if keeps {
-            motion.instances.extend(later.map(|later| (kept, later.clone())));
-            kept += 1;
+        [x.cross(y), y.cross(z), z.cross(x)].iter().any(|c| *c != DVec3::ZERO)
+    };
+    let mut later = std::mem::take(&mut scene.motion.instances);
+    let (mut old, mut new) = (0, 0);
+    scene.instances.retain(|instance| {
+        let keys = later.remove(&old);
+        old += 1;
+        // What is nothing now may be something before the shutter closes.
+        let stays = has_area(&instance.world_from_object) || keys.iter().flatten().any(has_area);
+        squashed.add(usize::from(!stays), &instance.name);
+        if stays {
+            scene.motion.instances.extend(keys.map(|keys| (new, keys)));
+            new += 1;
         }
-        keeps
+        stays
     });
     scene.warnings.extend(squashed.text("instances dropped: their scale squashes them to a line or a point"));
 }
@@ -147,7 +167,7 @@ fn drop_shapes(scene: &mut Scene) {
 /// Shapes of a smaller unit are dropped, metres.
 const LEAST_SIZE: f64 = 1e-30;
 
-fn check_ids(scene: &Scene) {
+fn check_ids(scene: &Scene, checked: &[Option<Findings>]) {
     for shape in &scene.shapes {
         scene.materials.get(shape.material.index()).expect("a shape's material was added to the builder");
         assert!(shape.world_from_object.is_finite(), "world transforms are finite");
@@ -156,8 +176,11 @@ fn check_ids(scene: &Scene) {
         scene.meshes.get(instance.mesh.index()).expect("an instance's mesh was added to the builder");
         assert!(instance.world_from_object.is_finite(), "world transforms are finite");
     }
-    for mesh in &scene.meshes {
+    for (mesh, checked) in scene.meshes.iter().zip(checked) {
         scene.materials.get(mesh.material.index()).expect("a mesh's material was added to the builder");
+        if checked.is_some() {
+            continue;
+        }
         let n = mesh.positions.len();
         assert!(mesh.normals.as_ref().is_none_or(|a| a.len() == n), "one normal per vertex");
         assert!(mesh.uv_sets.iter().all(|a| a.len() == n), "one texture coordinate per vertex");
@@ -166,6 +189,10 @@ fn check_ids(scene: &Scene) {
         assert!(mesh.tangents.as_ref().is_none_or(|a| a.len() == n), "one tangent per vertex");
         let in_range = |piece: &[[u32; 3]]| piece.as_flattened().iter().all(|&i| (i as usize) < n);
         assert!(mesh.indices.par_chunks(PIECE).all(in_range), "vertex indices are in range");
+    }
+    for (mesh, poses) in &scene.motion.meshes {
+        let n = scene.meshes.get(*mesh as usize).expect("what moves was added to the builder").positions.len();
+        assert!(poses.iter().all(|pose| pose.positions.len() == n), "one position per vertex at each time");
     }
     for m in &scene.materials {
         for read in m.textures() {
@@ -180,12 +207,12 @@ fn check_ids(scene: &Scene) {
     }
 }
 
-/// How many triangles of `mesh` were dropped: for an unusable vertex, for want of area.
-fn drop_triangles(mesh: &mut Mesh, keeps_flat: bool) -> [usize; 2] {
+/// How many triangles of `mesh` were dropped: for an unusable vertex and, if `flat` ones go, for want of area.
+fn drop_triangles(mesh: &mut Mesh, flat: bool) -> [usize; 2] {
     let positions = &mesh.positions;
     let judge = |triangle: &[u32; 3]| {
         let corners = triangle.map(|i| positions[i as usize]);
-        if !corners.iter().all(usable) { [1, 0] } else { [0, usize::from(!keeps_flat && is_flat(corners))] }
+        if !corners.iter().all(usable) { [1, 0] } else { [0, usize::from(flat && is_flat(corners))] }
     };
     // First counted, in parallel: nearly always there is nothing to drop.
     let count = |piece: &[[u32; 3]]| piece.iter().map(judge).fold([0, 0], sum);
@@ -260,11 +287,10 @@ mod tests {
     use super::*;
     use crate::material::Material;
     use crate::scene::{Instance, MaterialId, MeshId};
-    use glam::DMat4;
 
     fn scene(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Scene {
         let mesh = Mesh::plain("m", positions, indices, MaterialId(0));
-        Scene { meshes: vec![mesh], materials: vec![Material::default()], ..Scene::default() }
+        Scene { meshes: vec![Arc::new(mesh)], materials: vec![Material::default()], ..Scene::default() }
     }
 
     #[test]
@@ -273,7 +299,7 @@ mod tests {
         let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         positions.extend(bad.map(|b| [0.0, b, 0.0]));
         let mut scene = scene(positions, vec![[0, 1, 2], [0, 1, 3], [4, 1, 0], [0, 5, 1], [0, 1, 6]]);
-        check(&mut scene);
+        check(&mut scene, Vec::new());
         assert_eq!(scene.meshes[0].indices, [[0, 1, 2]]);
         assert!(scene.meshes[0].positions.iter().flatten().all(|c| c.abs() <= 1.0));
         assert_eq!(scene.warnings.len(), 1);
@@ -286,7 +312,7 @@ mod tests {
         let positions = vec![[0.0; 3], [e, 0.0, 0.0], [0.0, e, 0.0], [2.0 * e, 0.0, 0.0], [0.0; 3]];
         let indices = vec![[0, 1, 2], [0, 1, 3], [0, 0, 1], [0, 4, 1], [1, 1, 1]];
         let mut scene = scene(positions, indices);
-        check(&mut scene);
+        check(&mut scene, Vec::new());
         assert_eq!(scene.meshes[0].indices, [[0, 1, 2]]);
         assert!(scene.warnings[0].starts_with("4 triangles dropped: without area"), "{:?}", scene.warnings);
     }
@@ -294,8 +320,8 @@ mod tests {
     #[test]
     fn non_finite_uvs_become_zero() {
         let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
-        scene.meshes[0].uv_sets = vec![vec![[0.5, f32::NAN], [1.0, 2.0], [f32::INFINITY, 0.0]]];
-        check(&mut scene);
+        Arc::make_mut(&mut scene.meshes[0]).uv_sets = vec![vec![[0.5, f32::NAN], [1.0, 2.0], [f32::INFINITY, 0.0]]];
+        check(&mut scene, Vec::new());
         assert_eq!(scene.meshes[0].uv_sets, [[[0.0, 0.0], [1.0, 2.0], [0.0, 0.0]]]);
         assert!(scene.warnings[0].starts_with("2 texture coordinates"), "{:?}", scene.warnings);
     }
@@ -305,7 +331,7 @@ mod tests {
         let radiance = vec![[1.0; 3], [-1.0, 2.0, 3.0], [f32::NAN; 3], [f32::INFINITY, 0.0, 0.0]];
         let environment = Some(crate::light::Environment::new(2, 2, radiance));
         let mut scene = Scene { environment, ..Scene::default() };
-        check(&mut scene);
+        check(&mut scene, Vec::new());
         assert_eq!(scene.environment.unwrap().radiance[..], [[1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
         assert!(scene.warnings[0].starts_with("3 texels of the environment"), "{:?}", scene.warnings);
     }
@@ -313,8 +339,9 @@ mod tests {
     #[test]
     fn vertex_colors_above_one_stay_and_unusable_ones_are_cleaned() {
         let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
-        scene.meshes[0].colors = Some(vec![[2.0, 0.5, 0.0, 1.0], [-1.0, f32::NAN, 0.5, 1.0], [f32::INFINITY; 4]]);
-        check(&mut scene);
+        Arc::make_mut(&mut scene.meshes[0]).colors =
+            Some(vec![[2.0, 0.5, 0.0, 1.0], [-1.0, f32::NAN, 0.5, 1.0], [f32::INFINITY; 4]]);
+        check(&mut scene, Vec::new());
         let cleaned = vec![[2.0, 0.5, 0.0, 1.0], [0.0, 1.0, 0.5, 1.0], [1.0; 4]];
         assert_eq!(scene.meshes[0].colors, Some(cleaned));
         assert!(scene.warnings[0].starts_with("2 vertex colours"), "{:?}", scene.warnings);
@@ -327,7 +354,7 @@ mod tests {
             let world_from_object = DMat4::from_scale(DVec3::from_array(scale));
             scene.instances.push(Instance { mesh: MeshId(0), world_from_object, name: format!("{scale:?}") });
         }
-        check(&mut scene);
+        check(&mut scene, Vec::new());
         let kept: Vec<_> = scene.instances.iter().map(|i| i.name.as_str()).collect();
         assert_eq!(kept, ["[1.0, 1.0, 0.0]", "[-1.0, 1.0, 1e-6]"]);
         assert!(scene.warnings[0].starts_with("2 instances dropped"), "{:?}", scene.warnings);
@@ -336,8 +363,8 @@ mod tests {
     #[test]
     fn normals_are_left_to_the_renderer() {
         let mut scene = scene(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
-        scene.meshes[0].normals = Some(vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 1.0]]);
-        check(&mut scene);
+        Arc::make_mut(&mut scene.meshes[0]).normals = Some(vec![[0.0; 3], [f32::NAN; 3], [0.0, 0.0, 1.0]]);
+        check(&mut scene, Vec::new());
         assert!(scene.warnings.is_empty());
         assert_eq!(scene.triangle_count(), 0);
         assert_eq!(scene.meshes[0].indices.len(), 1);
@@ -349,6 +376,6 @@ mod tests {
     fn unknown_material_id_is_a_loader_bug() {
         let mut scene = scene(vec![], vec![]);
         scene.materials.clear();
-        check(&mut scene);
+        check(&mut scene, Vec::new());
     }
 }

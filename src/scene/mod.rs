@@ -7,8 +7,9 @@ mod motion;
 mod source;
 
 pub use crate::id::{ImageId, MaterialId, MeshId, TextureId};
+pub(crate) use builder::Notes;
 pub use builder::SceneBuilder;
-pub(crate) use check::MAX_COORDINATE;
+pub(crate) use check::{Findings, MAX_COORDINATE, check_mesh};
 pub use motion::{Motion, Pose};
 pub use source::{SourceFile, Stamp};
 
@@ -56,6 +57,15 @@ pub struct PlacedLight {
     pub name: String,
 }
 
+/// What a camera is framed on that a file does not give: of an animation the same for every frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Framing {
+    /// World space, metres, lowest and highest corner; `None` = nothing to see.
+    pub bounds: Option<(DVec3, DVec3)>,
+    /// Sum over all triangles of area times normal, m^2, world space: which side flat things show.
+    pub vector_area: DVec3,
+}
+
 /// Something in the file that the picture does not need and that was not read.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Skipped {
@@ -69,7 +79,9 @@ pub struct Skipped {
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangle meshes, object space.
-    pub meshes: Vec<Mesh>,
+    ///
+    /// Shared with the scenes of other moments where they do not change; so are images.
+    pub meshes: Vec<Arc<Mesh>>,
     /// Where they are.
     pub instances: Vec<Instance>,
     /// Spheres and surfaces of revolution, where they are.
@@ -79,7 +91,7 @@ pub struct Scene {
     /// Image + sampler pairs.
     pub textures: Vec<Texture>,
     /// Decoded pixels.
-    pub images: Vec<Image>,
+    pub images: Vec<Arc<Image>>,
     /// Punctual lights.
     pub lights: Vec<PlacedLight>,
     /// Light from all around, in world axes.
@@ -88,6 +100,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Where the node is on which lenses are to be focused, world space, metres; `None`: none was asked for.
     pub focus: Option<DVec3>,
+    /// What a camera is framed on where there is none; `None` = on the scene as it is.
+    pub framing: Option<Framing>,
     /// What of it moves while the shutter is open; empty for a scene at rest.
     pub motion: Motion,
     /// Which scene of the file this is.

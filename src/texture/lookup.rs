@@ -11,6 +11,7 @@ use crate::error::RenderError;
 use crate::math::lanes::{lerp, ln};
 use crate::math::{UvSets, V3};
 use simd::{Float, Lanes, Mask, Part, Uint};
+use std::borrow::Borrow;
 use std::collections::BTreeMap;
 
 /// No texture, in tables.
@@ -121,7 +122,8 @@ impl TextureTable {
     ///
     /// # Errors
     /// More texels than a 32-bit index reaches.
-    pub fn new(textures: &[Texture], images: &[Image]) -> Result<Self, RenderError> {
+    pub fn new(textures: &[Texture], images: &[impl Borrow<Image>]) -> Result<Self, RenderError> {
+        let images: Vec<&Image> = images.iter().map(Borrow::borrow).collect();
         let mut table = Self::default();
         table.reserve(images.iter().map(|i| words_of(&i.texels)).sum())?;
         let placed: Vec<[u32; 2]> = images.iter().map(|i| table.add(&i.texels)).collect();
@@ -131,7 +133,7 @@ impl TextureTable {
             Wrap::MirroredRepeat => MIRROR,
         };
         for t in textures {
-            let (image, [first, packing]) = (&images[t.image.index()], placed[t.image.index()]);
+            let (image, [first, packing]) = (images[t.image.index()], placed[t.image.index()]);
             let nearest = if t.filter == Filter::Nearest { NEAREST } else { 0 };
             let flags = wrap(t.wrap_u) | (wrap(t.wrap_v) << WRAP_BITS) | nearest | packing;
             table.textures.push([first, image.width, image.height, flags].map(f32::from_bits));
@@ -154,7 +156,8 @@ impl TextureTable {
     ///
     /// # Errors
     /// More texels than a 32-bit index reaches.
-    pub fn add_levels(&mut self, textures: &[Texture], images: &[Image]) -> Result<(), RenderError> {
+    pub fn add_levels(&mut self, textures: &[Texture], images: &[impl Borrow<Image>]) -> Result<(), RenderError> {
+        let images: Vec<&Image> = images.iter().map(Borrow::borrow).collect();
         let image = |texture: u32| textures[texture as usize].image.index();
         let mut wanted: Vec<(usize, Average)> = self.bound.iter().map(|&(t, average)| (image(t), average)).collect();
         wanted.sort_unstable();
@@ -162,12 +165,12 @@ impl TextureTable {
         let below = |i: &Image| sizes_below([i.width as usize, i.height as usize]);
         let more = |&(i, average): &(usize, Average)| match average {
             Average::Never => 0,
-            _ => below(&images[i]).iter().map(|[w, h]| words_for(&images[i].texels, w * h)).sum(),
+            _ => below(images[i]).iter().map(|[w, h]| words_for(&images[i].texels, w * h)).sum(),
         };
         self.reserve(wanted.iter().map(more).sum())?;
         let mut chains = BTreeMap::new();
         for (i, average) in wanted {
-            let Image { width, height, texels, .. } = &images[i];
+            let Image { width, height, texels, .. } = images[i];
             let texture = textures.iter().position(|t| t.image.index() == i).expect("bound textures have images");
             let record = |first: u32, [w, h]: Size| [first, w as u32, h as u32, 0].map(f32::from_bits);
             let (first, size) = (self.levels.len(), [*width as usize, *height as usize]);
@@ -181,7 +184,7 @@ impl TextureTable {
         }
         for (binding, &(texture, average)) in self.bound.iter().enumerate() {
             let (first, last) = chains[&(image(texture), average)];
-            let Image { width, height, .. } = &images[image(texture)];
+            let Image { width, height, .. } = images[image(texture)];
             let [[a, b, ..], [d, e, ..]] = [self.transforms[2 * binding], self.transforms[2 * binding + 1]];
             let texels = (a * e - b * d).abs() * *width as f32 * *height as f32;
             self.chains.push([f32::from_bits(first), last, texels, 0.0]);

@@ -5,7 +5,7 @@ use crate::config::{Config, Definition, Layer};
 use crate::parse;
 use clap::ArgMatches;
 use prt::batch::input::expand;
-use prt::batch::{CameraSource, EnvironmentSource, FileOptions, FileSettings, PictureSize, Task, Tone, View};
+use prt::batch::{CameraSource, EnvironmentSource, FileOptions, FileSettings, Frames, PictureSize, Task, Tone, View};
 use prt::camera::Lens;
 use prt::image::exr::ExrOptions;
 use prt::load::LoadOptions;
@@ -114,6 +114,9 @@ fn no_input(config: Option<&Path>) -> String {
 /// Samples per pixel where nothing is said about when sampling ends.
 const DEFAULT_SPP: u32 = 64;
 
+/// Frames a second where nothing is said.
+const DEFAULT_FPS: f64 = 24.0;
+
 /// How a file is rendered, in a run with that limit.
 ///
 /// # Errors
@@ -158,6 +161,7 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
         camera_source: camera_source(args)?,
         cameras: args.camera.clone(),
         environment: environment(args)?,
+        frames: frames(args)?,
         load: LoadOptions {
             asset_root: args.asset_root.clone(),
             scene: args.scene.clone(),
@@ -175,6 +179,30 @@ pub fn file_settings(args: &FileArgs, batch_time_limit: Option<Duration>) -> Res
             tone: Tone { exposure: args.exposure, curve: args.tonemap },
         },
     })
+}
+
+fn frames(args: &FileArgs) -> Result<Option<Frames>, String> {
+    let lonely = [
+        ("--fps", args.fps.is_some()),
+        ("--animation", args.animation.is_some()),
+        ("--shutter", args.shutter.is_some()),
+        ("--shutter-position", args.shutter_position.is_some()),
+    ];
+    let Some(choice) = &args.frames else {
+        return match lonely.iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => {
+                Err(format!("{option} needs --frames, such as --frames all: without it nothing in a file moves"))
+            }
+            None => Ok(None),
+        };
+    };
+    Ok(Some(Frames {
+        choice: choice.clone(),
+        fps: args.fps.unwrap_or(DEFAULT_FPS),
+        animation: args.animation.clone().unwrap_or_default(),
+        shutter: args.shutter,
+        position: args.shutter_position.unwrap_or_default(),
+    }))
 }
 
 fn environment(args: &FileArgs) -> Result<Option<EnvironmentSource>, String> {

@@ -4,11 +4,12 @@ use crate::args::What;
 use crate::generate::Product;
 use crate::words::Words;
 use clap::builder::{PossibleValue, TypedValueParser};
-use prt::batch::{job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
+use prt::batch::{FrameChoice, job::CameraChoice, memory::MemoryLimit, names::NameTemplate};
 use prt::camera::Lens;
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
+use prt::load::{AnimationChoice, ShutterPosition};
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, FilterShape, Integrator, Layers};
 use prt::verify::contenders::Backend;
 use std::ffi::OsStr;
@@ -102,6 +103,40 @@ pub fn clamp(value: &str) -> Result<f32, String> {
     value.parse().ok().filter(inside).ok_or_else(|| {
         "must be nits from 1e-6 to 1e12, such as 10; without indirect light at all: --max-bounces 0".into()
     })
+}
+
+pub fn frames(value: &str) -> Result<FrameChoice, String> {
+    value.parse()
+}
+
+pub fn fps(value: &str) -> Result<f64, String> {
+    let inside = |fps: &f64| (0.001..=1e6).contains(fps);
+    value.parse().ok().filter(inside).ok_or_else(|| "must be frames a second from 0.001 to 1e6, such as 24".into())
+}
+
+pub fn animation(value: &str) -> Result<AnimationChoice, String> {
+    Ok(match (value, value.parse()) {
+        ("", _) => return Err("must be an index, a name or all".into()),
+        ("all", _) => AnimationChoice::All,
+        (_, Ok(index)) => AnimationChoice::Index(index),
+        (name, Err(_)) => AnimationChoice::Name(name.into()),
+    })
+}
+
+/// Share of a frame.
+pub fn shutter(value: &str) -> Result<f64, String> {
+    let inside = |share: &f64| (0.0..=1.0).contains(share);
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    number(value).filter(inside).ok_or_else(|| {
+        let degrees = number(value).filter(|degrees| *degrees > 1.0 && *degrees <= 360.0);
+        let meant = degrees.map_or_else(String::new, |d| format!("; {d} degrees are {:.4}", d / 360.0));
+        format!("must be a share of a frame from 0 to 1, such as 0.5{meant}")
+    })
+}
+
+pub fn shutter_position() -> Words<ShutterPosition> {
+    use ShutterPosition::{Center, End, Start};
+    Words::new(&[("start", Start), ("center", Center), ("end", End)], &[])
 }
 
 pub fn spp(value: &str) -> Result<u32, String> {

@@ -20,22 +20,6 @@ const fn option(heading: &'static str, name: &'static str, value: &'static str, 
 
 const OPTIONS: &[Unbuilt] = &[
     option("Files", "transparent", "", "Alpha from coverage; background not in the beauty [default: off: alpha 1]"),
-    option(
-        "Animation",
-        "frames",
-        "all|1-24|1-100x2|1,5,9",
-        "Frame f is at t = f/fps; channels clamp outside their keys; all = 0..ceil(duration x fps) [default: the file \
-         as written, no animation]",
-    ),
-    option("Animation", "fps", "N", "Frames a second [default: 24]"),
-    option("Animation", "animation", "INDEX|NAME|all", "Which animation [default: 0]"),
-    option(
-        "Animation",
-        "shutter",
-        "FRACTION",
-        "Share of a frame that the shutter is open [default: from the file, else 0]",
-    ),
-    option("Animation", "shutter-position", "start|center|end", "Where the open shutter lies [default: center]"),
     option("Terminal", "display", "HOST:PORT", "Show pictures as they grow in tev"),
 ];
 

@@ -215,6 +215,16 @@ impl Elements<'_> {
         )
     }
 
+    /// All numbers one after the other, `[count x components]`; normalised integers as by [`Elements::floats`].
+    pub fn numbers(&self) -> Result<Vec<f32>> {
+        Ok(match self.components {
+            1 => self.floats::<1>()?.into_flattened(),
+            2 => self.floats::<2>()?.into_flattened(),
+            3 => self.floats::<3>()?.into_flattened(),
+            _ => self.floats::<4>()?.into_flattened(),
+        })
+    }
+
     /// `[count]` colours; those without alpha get 1.
     pub fn colors(&self) -> Result<Vec<[f32; 4]>> {
         if self.components == 4 {

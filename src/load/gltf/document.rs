@@ -26,13 +26,17 @@ pub(super) struct Document {
     pub source: SourceFile,
     /// Buffers opened so far, one cell per `/buffers/i`.
     pub buffers: Vec<OnceLock<Store>>,
-    /// Number of animations, none of which is read.
+    /// Number of animations; see `animation`.
     pub animations: usize,
+    /// Extensions that are ignored were noted for one moment, which is enough.
+    pub is_noted: std::sync::atomic::AtomicBool,
     /// About the container.
     pub warnings: Vec<String>,
     /// Extensions that reached objects carry and that are not read: first place, how many places.
     pub ignored: Mutex<BTreeMap<String, (String, usize)>>,
-    json: Vec<u8>,
+    /// The JSON with what an animation has set in it by pointers, once it has.
+    pub posed: Option<Value>,
+    pub(super) json: Vec<u8>,
     bin: Option<Range<u64>>,
 }
 
@@ -45,7 +49,31 @@ impl Document {
         let uris = Resolver::new(file, asset_root)?;
         let buffers = root.buffers.iter().map(|_| OnceLock::new()).collect();
         let ignored = Mutex::default();
-        Ok(Self { file: file.to_owned(), root, uris, source, buffers, animations, warnings, ignored, json, bin })
+        let (posed, is_noted) = (None, Default::default());
+        Ok(Self {
+            file: file.to_owned(),
+            root,
+            uris,
+            source,
+            buffers,
+            animations,
+            warnings,
+            ignored,
+            is_noted,
+            posed,
+            json,
+            bin,
+        })
+    }
+
+    /// Looks for every file that the document names. Which of them a moment needs depends on the time, and what a frame is
+    /// made from must not depend on the frames before it.
+    pub fn look_for_all(&self) {
+        let uris = (self.root.buffers.iter().map(|b| &b.uri)).chain(self.root.images.iter().map(|i| &i.uri)).flatten();
+        for uri in uris.filter(|uri| !uri.get(..5).is_some_and(|s| s.eq_ignore_ascii_case("data:"))) {
+            // What is wrong with it is said by who needs it.
+            let _ = self.resolve("", uri);
+        }
     }
 
     /// Where in the file the BIN chunk of a `.glb` is.
@@ -99,7 +127,7 @@ fn parse(file: &Path, json: &[u8]) -> Result<(Root, usize)> {
 }
 
 /// Parses again where the `gltf` crate asks for more than the specification: it wants `nodes` in every scene and a
-/// `node` in every animation target (KHR_animation_pointer has none), and we read no animation at all.
+/// `node` in every animation target (KHR_animation_pointer has none), and we read animations ourselves.
 fn relax(json: &[u8]) -> Option<(Root, usize)> {
     let mut value: Value = serde_json::from_slice(json).ok()?;
     let top = value.as_object_mut()?;

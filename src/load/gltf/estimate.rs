@@ -23,17 +23,19 @@ const JSON: u64 = 10;
 /// Bytes a triangle while MikkTSpace makes tangents, and what the allocator keeps of them; measured.
 const MIKKTSPACE: u64 = 450;
 const MIKKTSPACE_LEFT: u64 = 80;
-/// Bytes a vertex while a skin moves it: joints and weights of two sets.
-const SKIN: u64 = 64;
-/// Bytes a vertex while a morph target moves it: one attribute's differences.
-const MORPH: u64 = 16;
+/// Bytes a vertex while a skin moves it: its matrix.
+const SKIN: u64 = 128;
+/// Bytes a vertex of each morph target: differences of three attributes.
+const MORPH: u64 = 36;
+/// Bytes a vertex that a skin moves: joints and weights of two sets.
+const INFLUENCES: u64 = 48;
 
 /// Bytes at most while `path` is read; `None` where the loader will refuse it, or where it cannot be told.
 pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<LoadEstimate> {
     let length = container::json_length(path)?;
     if length > MOST_JSON {
         let json = length.saturating_mul(JSON);
-        return Some(LoadEstimate { bytes: json, left_over: json });
+        return Some(LoadEstimate { bytes: json, left_over: json, unmoved: 0 });
     }
     let container = container::read(path).ok()?;
     let outline: Outline = serde_json::from_slice(&container.json).ok()?;
@@ -49,9 +51,9 @@ pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<Lo
     let variant = options.variant.as_deref().and_then(|name| outline.variant(name));
     let mut survey = Survey { path, outline: &outline, folders, bin, variant, reached: Reached::default() };
     survey.nodes(options.scene.as_deref())?;
-    let Reached { kept, passing, left_over, images, .. } = std::mem::take(&mut survey.reached);
+    let Reached { kept, passing, left_over, unmoved, images, .. } = std::mem::take(&mut survey.reached);
     let found: Vec<Picture> = images.iter().filter_map(|(&image, &used)| survey.picture(image, used)).collect();
-    Some(LoadEstimate { bytes: json + kept + passing.max(pictures(&found)), left_over: text + left_over })
+    Some(LoadEstimate { bytes: json + kept + passing.max(pictures(&found)), left_over: text + left_over, unmoved })
 }
 
 /// Bytes of an instance's name: the smallest piece that the allocator gives out.
@@ -64,7 +66,9 @@ struct Reached {
     kept: u64,
     /// Most bytes at any time beyond those while one mesh is read.
     passing: u64,
-    /// Bytes that the allocator keeps of those.
+    /// Bytes of vertices before anything moves them, and of what moves them.
+    unmoved: u64,
+    /// Bytes that the allocator keeps of those that pass.
     left_over: u64,
     /// Meshes in their poses.
     meshes: BTreeSet<(usize, Option<usize>, Vec<u32>)>,
@@ -182,10 +186,14 @@ impl Survey<'_> {
         if node.skin.is_some() {
             passing += n * SKIN;
         }
-        if !primitive.targets.is_empty() {
-            passing += n * MORPH;
-        }
         let kept = n.saturating_mul(vertex).saturating_add(triangles.saturating_mul(12));
+        let targets = primitive.targets.len() as u64;
+        if node.skin.is_some() || targets > 0 {
+            let influences = if node.skin.is_some() { n * INFLUENCES } else { 0 };
+            let unmoved = kept.saturating_add(influences).saturating_add(targets.saturating_mul(n * MORPH));
+            passing = passing.saturating_add(unmoved);
+            self.reached.unmoved = self.reached.unmoved.saturating_add(unmoved);
+        }
         self.reached.kept = self.reached.kept.saturating_add(kept);
         self.reached.passing = self.reached.passing.max(passing);
         Some(())

@@ -3,11 +3,13 @@
 use super::locate::shorten;
 use super::{Document, Loader, Result};
 use std::sync::PoisonError;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Read.
 const READ: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_texture_webp",
+    "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -36,7 +38,6 @@ const WITHOUT_EFFECT: &[&str] = &[
     "EXT_mesh_manifold",
     "EXT_structural_metadata",
     "GODOT_single_root",
-    "KHR_animation_pointer",
     "KHR_audio_emitter",
     "KHR_implicit_shapes",
     "KHR_interactivity",
@@ -80,6 +81,9 @@ pub(super) fn note_carried<'a>(
     pointer: &str,
     except: &[&str],
 ) {
+    if doc.is_noted.load(Relaxed) {
+        return;
+    }
     for name in names.filter(|n| is_ignored(n) && !except.contains(&n.as_str())) {
         let mut ignored = doc.ignored.lock().unwrap_or_else(PoisonError::into_inner);
         ignored.entry(name.clone()).and_modify(|(_, n)| *n += 1).or_insert_with(|| (pointer.to_owned(), 1));
@@ -90,6 +94,7 @@ pub(super) fn note_carried<'a>(
 /// place, and of those that only the file's list names.
 pub(super) fn warn_ignored(loader: &mut Loader) {
     let doc = loader.doc;
+    doc.is_noted.store(true, Relaxed);
     let ignored = doc.ignored.lock().unwrap_or_else(PoisonError::into_inner);
     for (name, (first, count)) in ignored.iter() {
         let more = if *count > 1 { format!(", first of {count} places") } else { String::new() };

@@ -9,6 +9,7 @@ use crate::texture::{Channels, Image, Texels};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// An image that is found but not yet decoded.
 struct Encoded<'d> {
@@ -25,24 +26,37 @@ enum Bytes<'d> {
     File(PathBuf),
 }
 
-/// Decodes the images that textures need and adds them to the scene in the order of their ids.
+/// Decodes the images that textures need, but for those that an earlier moment needed, and adds them to the scene in the
+/// order of their ids.
 pub(super) fn decode_all(loader: &mut Loader) -> Result<()> {
     let doc = loader.doc;
-    let found: Vec<Encoded> = loader.textures.images.iter().map(|&i| find(doc, i)).collect::<Result<_>>()?;
     let used = loader.builder.channels();
+    let wanted: Vec<(usize, Channels)> = loader
+        .textures
+        .images
+        .iter()
+        .enumerate()
+        .map(|(i, &k)| (k, used.get(i).copied().unwrap_or_default()))
+        .collect();
+    let is_known = |&(i, used): &(usize, Channels)| loader.kept.images.get(&i).is_some_and(|(kept, ..)| *kept == used);
+    let missing: Vec<(Encoded, Channels)> = (wanted.iter().filter(|each| !is_known(each)))
+        .map(|&(i, used)| Ok((find(doc, i)?, used)))
+        .collect::<Result<_>>()?;
     // An error is made from its kind afterwards: a document is not shared between threads.
-    let decode = |(i, encoded)| decode_one(encoded, used.get(i).copied().unwrap_or_default());
-    let decoded: Vec<_> = found.par_iter().enumerate().map(decode).collect();
-    for (encoded, result) in found.iter().zip(decoded) {
+    let decoded: Vec<_> = missing.par_iter().map(|(encoded, used)| decode_one(encoded, *used)).collect();
+    for ((encoded, used), result) in missing.iter().zip(decoded) {
         let (mut image, format) = result.map_err(|(problem, fix)| doc.error(&encoded.pointer, problem, fix))?;
         let name = doc.root.images.get(encoded.index).and_then(|i| i.name.as_ref());
         image.name = name_or(name, "images", encoded.index);
-        if let Some(said) = Format::from_media_type(&encoded.media)
-            && said != format
-        {
-            let text = format!("/images/{}: said to be {said} but is {format}: read as {format}", encoded.index);
-            loader.builder.warn(text);
-        }
+        let said = Format::from_media_type(&encoded.media).filter(|said| *said != format);
+        let note =
+            said.map(|said| format!("/images/{}: said to be {said} but is {format}: read as {format}", encoded.index));
+        loader.kept.images.insert(encoded.index, (*used, Arc::new(image), note));
+    }
+    for (i, _) in wanted {
+        let known = loader.kept.images.get(&i).map(|(_, image, note)| (Arc::clone(image), note.clone()));
+        let Some((image, note)) = known else { return Err(doc.error(format!("/images/{i}"), "no such image", "")) };
+        note.into_iter().for_each(|note| loader.builder.warn(note));
         loader.builder.add_image(image);
     }
     Ok(())

@@ -34,8 +34,11 @@ impl Document {
 
     /// The JSON value at a pointer as it is in the file, shortened; only for messages: it parses the file again.
     pub fn shown(&self, pointer: &str) -> String {
-        let value: Option<Value> = serde_json::from_slice(self.json()).ok();
-        match value.as_ref().and_then(|v| v.pointer(pointer)) {
+        let parsed: Option<Value> = match self.posed {
+            Some(_) => None,
+            None => serde_json::from_slice(self.json()).ok(),
+        };
+        match self.posed.as_ref().or(parsed.as_ref()).and_then(|v| v.pointer(pointer)) {
             None => "(absent)".into(),
             Some(value) => shorten(&value.to_string()),
         }

@@ -1,7 +1,8 @@
 //! Meshes in a pose (morph weights, skin), each read once: one [`Mesh`](crate::shape::Mesh) per primitive of triangles.
 
-use super::primitive;
+use super::primitive::{self, Found};
 use super::skin::{self, Palette};
+use super::trace::Form;
 use super::{Document, Loader, Result, extensions, name_or};
 use crate::scene::MeshId;
 use glam::DMat4;
@@ -17,6 +18,8 @@ pub(super) struct Key {
     skin: Option<usize>,
     /// Bits of the weights of morph targets; empty if all are 0.
     weights: Vec<u32>,
+    /// Whose weights change while the shutter is open: nothing else can be known to change alike.
+    alone: Option<usize>,
 }
 
 /// The primitives of a mesh that can be drawn.
@@ -33,14 +36,17 @@ pub(super) fn read(
     index: Index<Json>,
     pointer: &str,
     node: &Node,
-    node_at: &str,
+    node_index: usize,
 ) -> Result<Posed> {
+    let node_at = &format!("/nodes/{node_index}");
     let doc = loader.doc;
     let mesh = doc.item(&doc.root.meshes, index, pointer, "meshes")?;
     let weights = weights(doc, mesh, index.value(), node, node_at)?;
     let moved = weights.iter().any(|&w| w != 0.0);
     let bits = if moved { weights.iter().map(|w| w.to_bits()).collect() } else { Vec::new() };
-    let key = Key { mesh: index.value(), skin: node.skin.map(|s| s.value()), weights: bits };
+    let is_alone = loader.morphing.contains(&node_index);
+    let skin = node.skin.map(|s| s.value());
+    let key = Key { mesh: index.value(), skin, weights: bits, alone: is_alone.then_some(node_index) };
     if let Some(done) = loader.meshes.get(&key) {
         return Ok(done.clone());
     }
@@ -56,9 +62,20 @@ pub(super) fn read(
     let mut ids = Vec::new();
     for (i, found) in mesh.primitives.iter().enumerate() {
         let at = format!("{at}/primitives/{i}");
-        let weights = if moved { &weights[..] } else { &[] };
-        if let Some(mesh) = primitive::read(loader, found, &at, &name, weights, palette.as_deref())? {
-            ids.push(loader.builder.add_mesh(mesh));
+        let weights = if moved || is_alone { &weights[..] } else { &[] };
+        let found = Found { primitive: found, at: &at, name: &name, key: (index.value(), i) };
+        if let Some(read) = primitive::read(loader, found, weights, palette.as_deref())? {
+            if let Some(base) = read.base {
+                loader.trace.forms.push(Form {
+                    id: read.id,
+                    base,
+                    origin: read.origin,
+                    key: found.key,
+                    node: node_index,
+                    skin,
+                });
+            }
+            ids.push(read.id);
         }
     }
     let posed = Posed { ids: ids.into(), world: palette.as_deref().map(Palette::world) };
@@ -67,7 +84,7 @@ pub(super) fn read(
 }
 
 /// The weights of the morph targets: the node's, else the mesh's, else none.
-fn weights(doc: &Document, mesh: &Json, index: usize, node: &Node, node_at: &str) -> Result<Vec<f32>> {
+pub(super) fn weights(doc: &Document, mesh: &Json, index: usize, node: &Node, node_at: &str) -> Result<Vec<f32>> {
     let (weights, at) = match (&node.weights, &mesh.weights) {
         (Some(weights), _) => (weights, format!("{node_at}/weights")),
         (None, Some(weights)) => (weights, format!("/meshes/{index}/weights")),

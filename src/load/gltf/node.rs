@@ -189,7 +189,7 @@ fn place(loader: &mut Loader, node: &Node, i: usize, Above { world, visible }: A
     } else if let Some(index) = node.mesh
         && visible
     {
-        place_mesh(loader, node, index, &at, world, name())?;
+        place_mesh(loader, node, index, i, world, name())?;
     }
     // Hidden nodes keep their cameras: the extension says that it does not affect them.
     place_camera(loader, node, i, world)?;
@@ -198,6 +198,7 @@ fn place(loader: &mut Loader, node: &Node, i: usize, Above { world, visible }: A
     {
         let pointer = format!("{at}/extensions/KHR_lights_punctual/light");
         light::place(loader, light.light, &pointer, world, &at, &name())?;
+        loader.trace.lights.push(i);
     }
     Ok(())
 }
@@ -207,32 +208,36 @@ fn place_mesh(
     loader: &mut Loader,
     node: &Node,
     index: Index<gltf::json::Mesh>,
-    at: &str,
+    i: usize,
     world: DMat4,
     name: String,
 ) -> Result<()> {
-    let posed = mesh::read(loader, index, &format!("{at}/mesh"), node, at)?;
+    let at = &format!("/nodes/{i}");
+    let posed = mesh::read(loader, index, &format!("{at}/mesh"), node, i)?;
     let instancing = node.extensions.as_ref().and_then(|e| e.others.get(instancing::NAME));
-    let worlds = match (instancing, posed.world) {
-        (None, Some(world)) => vec![world],
+    // Below the node; of what joints place, nothing is.
+    let (world, locals) = match (instancing, posed.world) {
+        (None, Some(world)) => (world, vec![DMat4::IDENTITY]),
         (Some(_), Some(world)) => {
             loader.lose_once("instances of a skinned mesh are not placed: its joints place it, once");
-            vec![world]
+            (world, vec![DMat4::IDENTITY])
         }
-        (None, None) => vec![world],
+        (None, None) => (world, vec![DMat4::IDENTITY]),
         (Some(found), None) => {
             let at = format!("{at}/extensions/{}", instancing::NAME);
-            let each = instancing::read(loader, found, &at)?;
-            each.into_iter().map(|instance| world * instance).collect()
+            (world, instancing::read(loader, found, &at)?)
         }
     };
-    for world_from_object in worlds {
+    let is_rigid = posed.world.is_none();
+    for node_from_object in locals {
+        let world_from_object = world * node_from_object;
         if !world_from_object.is_finite() {
             let fix = "The product of the transforms above it is too large.";
             return Err(loader.doc.error(at, "the world transform of an instance is not finite", fix));
         }
         for &mesh in posed.ids.iter() {
             loader.builder.add_instance(Instance { mesh, world_from_object, name: name.clone() });
+            loader.trace.instances.push(is_rigid.then_some((i, node_from_object, mesh)));
         }
     }
     Ok(())
@@ -242,7 +247,9 @@ fn place_camera(loader: &mut Loader, node: &Node, i: usize, world: DMat4) -> Res
     let Some(index) = node.camera else { return Ok(()) };
     let at = format!("/nodes/{i}");
     let given = node.name.as_deref().unwrap_or_default();
-    camera::place(loader, index, &format!("{at}/camera"), world, &at, given, &node.extras)
+    camera::place(loader, index, &format!("{at}/camera"), world, &at, given, &node.extras)?;
+    loader.trace.cameras.push(i);
+    Ok(())
 }
 
 /// The node's own transform.

@@ -1,27 +1,156 @@
-//! One primitive: its attributes, deformed by morph targets and skin, as a [`Mesh`].
+//! One primitive: its attributes, deformed by morph targets and skin, as a [`Mesh`]. Those that do not depend on the pose
+//! are read once for all moments of an animation.
 
 use super::accessor::{self, Elements};
+use super::base::{Base, Deformed, TangentNote};
+use super::kept::KeptBase;
 use super::material::Along;
 use super::semantic::{INDICES, NORMAL, POSITION, TANGENT, Wanted};
-use super::skin::Palette;
+use super::skin::{Influences, Palette};
 use super::topology::{Topology, topology};
-use super::{Loader, Result, extensions, material, morph, variants};
-use crate::load::tangents;
+use super::{Loader, Result, extensions, material, variants};
+use crate::scene::{MaterialId, MeshId};
 use crate::shape::Mesh;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use rayon::prelude::*;
+use std::sync::Arc;
 
-/// Reads a primitive, found at `at` in the mesh `name`, in a pose; `weights` are those of its morph targets (empty =
-/// all 0). `None` if it has no triangles.
+/// A primitive and where it was found.
+#[derive(Clone, Copy)]
+pub(super) struct Found<'p> {
+    pub primitive: &'p Primitive,
+    pub at: &'p str,
+    /// The mesh's.
+    pub name: &'p str,
+    /// Mesh and primitive, by index.
+    pub key: (usize, usize),
+}
+
+/// A primitive in the scene, in a pose.
+#[derive(Clone, Debug)]
+pub(super) struct Read {
+    pub id: MeshId,
+    /// What it is a pose of, and for each of its vertices that of the base, where they are not the same: for other times.
+    pub base: Option<Arc<Base>>,
+    pub origin: Option<Arc<[u32]>>,
+}
+
+/// Adds a primitive in a pose; `weights` are those of its morph targets (empty = all 0). `None` if there is nothing to draw.
 pub(super) fn read(
     loader: &mut Loader,
-    primitive: &Primitive,
-    at: &str,
-    name: &str,
+    found: Found,
     weights: &[f32],
     palette: Option<&Palette>,
-) -> Result<Option<Mesh>> {
+) -> Result<Option<Read>> {
+    let Found { at, name, key, .. } = found;
+    let Some((base, material)) = base(loader, found)? else { return Ok(None) };
+    if base.is_zero && weights.is_empty() {
+        loader.builder.warn(format!("{name}: the POSITION of {at} are all zero: nothing to draw"));
+        return Ok(None);
+    }
+    let is_moved = !weights.is_empty() || palette.is_some();
+    let base = match loader.kept.is_kept {
+        true => {
+            loader.kept.bases.insert(key, KeptBase::Base(Arc::clone(&base)));
+            base
+        }
+        // Nobody else will ask for it: its vertices need not be there twice.
+        false if !is_moved => match Arc::try_unwrap(base).map(Base::into_plain) {
+            Ok((mut mesh, too_many)) => {
+                say_too_many(loader, too_many, found);
+                mesh.material = material;
+                return Ok(Some(Read { id: loader.builder.add_mesh(mesh), base: None, origin: None }));
+            }
+            Err(base) => base,
+        },
+        false => base,
+    };
+    prepare(loader, found, &base, weights, palette)?;
+    let (id, origin) = if is_moved {
+        let Deformed { mut mesh, origin, too_many } = base.deformed(weights, palette);
+        say_too_many(loader, too_many, found);
+        mesh.material = material;
+        (loader.builder.add_mesh(mesh), origin.map(Into::into))
+    } else {
+        let (mesh, findings, too_many) = base.plain();
+        say_too_many(loader, too_many, found);
+        let mesh = match mesh.material == material {
+            true => mesh,
+            false => Arc::new(Mesh { material, ..(*mesh).clone() }),
+        };
+        (loader.builder.add_checked_mesh(mesh, findings), base.plain_origin())
+    };
+    let base = loader.kept.is_kept.then_some(base);
+    Ok(Some(Read { id, base, origin }))
+}
+
+/// Reads what a pose by these weights and joints needs, if it was not read before.
+pub(super) fn prepare(
+    loader: &Loader,
+    Found { primitive, at, .. }: Found,
+    base: &Base,
+    weights: &[f32],
+    palette: Option<&Palette>,
+) -> Result<()> {
+    let attributes = Attributes { loader, primitive, at };
+    base.targets.read(&attributes, weights, base.mesh())?;
+    let Some(palette) = palette else { return Ok(()) };
+    let influences = match base.influences.get() {
+        Some(known) => known,
+        None => {
+            let read = Influences::read(&attributes, base.count, base.origin.as_deref())?;
+            base.influences.get_or_init(|| read)
+        }
+    };
+    influences.check(palette, &attributes)
+}
+
+/// The primitive unmoved, and its material; `None`, noted, if there is nothing to draw.
+fn base(loader: &mut Loader, found: Found) -> Result<Option<(Arc<Base>, MaterialId)>> {
+    let Found { primitive, at, key, .. } = found;
+    let known = loader.kept.bases.get(&key).cloned();
+    if let Some(KeptBase::Nothing(notes)) = &known {
+        loader.builder.note_again(notes);
+        return Ok(None);
+    }
+    let before = loader.builder.note_counts();
+    if let Some(KeptBase::Base(base)) = known {
+        let (material, material_at) = variants::material(loader, primitive, at)?;
+        let surface = material::read(loader, material, &material_at)?;
+        // An animated factor may have made a texture appear, and with it its coordinates.
+        if base.serves(&surface) {
+            loader.builder.note_again(&base.notes);
+            return Ok(Some((base, surface.id)));
+        }
+    }
+    let Some((indices, positions)) = read_triangles(loader, found)? else {
+        let notes = loader.builder.notes_since(before);
+        loader.kept.bases.insert(key, KeptBase::Nothing(Arc::new(notes)));
+        return Ok(None);
+    };
+    let mut notes = loader.builder.notes_since(before);
+    let (material, material_at) = variants::material(loader, primitive, at)?;
+    // What is said of materials is said for every moment: they are read for each.
+    let surface = material::read(loader, material, &material_at)?;
+    let before = loader.builder.note_counts();
+    let mut base = read_vertices(loader, found, &surface, indices, positions)?;
+    notes.append(loader.builder.notes_since(before));
+    base.notes = notes;
+    Ok(Some((Arc::new(base), surface.id)))
+}
+
+fn say_too_many(loader: &mut Loader, too_many: Option<usize>, Found { at, name, .. }: Found) {
+    if let Some(n) = too_many {
+        let text =
+            format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
+        loader.builder.warn(text);
+    }
+}
+
+/// The triangles and where their corners are, not yet read; `None`, noted, if there is nothing to draw.
+fn read_triangles<'d>(loader: &mut Loader<'d>, found: Found) -> Result<Option<(Vec<[u32; 3]>, Elements<'d>)>> {
+    let Found { primitive, at, name, .. } = found;
     let doc = loader.doc;
     if let Some(carried) = &primitive.extensions {
         extensions::note_carried(doc, carried.others.keys(), at, &["KHR_draco_mesh_compression"]);
@@ -30,15 +159,19 @@ pub(super) fn read(
         loader.builder.lose(format!("{name}: {at} has no POSITION: nothing to draw"));
         return Ok(None);
     };
-    if positions.is_zero() && weights.is_empty() {
-        loader.builder.warn(format!("{name}: the POSITION of {at} are all zero: nothing to draw"));
-        return Ok(None);
-    }
-    let n = positions.count;
-    let Some(indices) = triangles(loader, primitive, at, name, n)? else { return Ok(None) };
+    Ok(triangles(loader, primitive, at, name, positions.count)?.map(|indices| (indices, positions)))
+}
 
-    let (material, material_at) = variants::material(loader, primitive, at)?;
-    let surface = material::read(loader, material, &material_at)?;
+/// The vertices as the file has them, those attributes that the material asks for.
+fn read_vertices(
+    loader: &mut Loader,
+    found: Found,
+    surface: &material::Read,
+    indices: Vec<[u32; 3]>,
+    positions: Elements,
+) -> Result<Base> {
+    let Found { primitive, at, name, .. } = found;
+    let (n, is_zero) = (positions.count, positions.is_zero());
     let attributes = Attributes { loader, primitive, at };
     let normals = attributes.open(&Semantic::Normals, &NORMAL, Some(n))?;
     // Without normals, tangents are to be ignored (section 3.7.2.1).
@@ -74,7 +207,7 @@ pub(super) fn read(
             (uv_sets, (tangents, colors.map(|e| e.colors()).transpose()))
         },
     );
-    let mut mesh = Mesh {
+    let mesh = Mesh {
         positions: positions?,
         normals: normals?,
         uv_sets: uv_sets?,
@@ -84,10 +217,6 @@ pub(super) fn read(
         material: surface.id,
         name: name.to_owned(),
     };
-    morph::apply(&attributes, weights, &mut mesh)?;
-    if let Some(palette) = palette {
-        palette.apply(&attributes, &mut mesh)?;
-    }
     for set in missing {
         let text = format!("{name}: {at} has no TEXCOORD_{set}, which {} reads: taken as 0", surface.pointer);
         loader.builder.lose(text);
@@ -95,26 +224,17 @@ pub(super) fn read(
     if primitive.attributes.contains_key(&Checked::Valid(Semantic::Colors(1))) {
         loader.lose_once("vertex colours other than COLOR_0 are ignored");
     }
-    if let Some(along) = along {
-        add_tangents(loader, &mut mesh, at, along);
-    }
-    Ok(Some(mesh))
-}
-
-/// Gives a mesh whose material asks for them tangents, or repairs those it has.
-fn add_tangents(loader: &mut Loader, mesh: &mut Mesh, at: &str, along: Along) {
-    let name = mesh.name.clone();
-    if mesh.tangents.is_some() {
-        let repaired = tangents::repair(mesh);
-        if repaired > 0 {
-            let text = format!("{name}: {at}: {repaired} tangents have no direction across the normal: replaced");
+    let targets = primitive.targets.as_ref().map_or(0, Vec::len);
+    let (base, note) = Base::new(mesh, is_zero, targets, surface, along);
+    match note {
+        Some(TangentNote::Repaired(n)) => {
+            let text = format!("{name}: {at}: {n} tangents have no direction across the normal: replaced");
             loader.builder.warn(text);
         }
-    } else if let Err(tangents::TooManyTriangles(n)) = tangents::generate(mesh, along.set, along.transform) {
-        let text =
-            format!("{name}: {at}: {n} triangles meet in one vertex, too many for MikkTSpace: any tangents used");
-        loader.builder.warn(text);
+        Some(TangentNote::TooMany(n)) => say_too_many(loader, Some(n), found),
+        None => {}
     }
+    Ok(base)
 }
 
 /// The triangles of a primitive of `n` vertices; `None`, noted, if it has none.

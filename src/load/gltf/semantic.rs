@@ -23,7 +23,7 @@ pub(super) struct Wanted {
     /// Allowed besides if the file uses `KHR_mesh_quantization`.
     pub quantized: &'static [Kind],
     /// In words, for messages.
-    pub allowed: &'static str,
+    pub allowed: Cow<'static, str>,
 }
 
 const fn kind(component: ComponentType, normalized: bool) -> Kind {
@@ -48,7 +48,7 @@ const fn wanted(
     quantized: &'static [Kind],
     allowed: &'static str,
 ) -> Wanted {
-    Wanted { name: Cow::Borrowed(name), shapes, core, quantized, allowed }
+    Wanted { name: Cow::Borrowed(name), shapes, core, quantized, allowed: Cow::Borrowed(allowed) }
 }
 
 /// Vertex positions.
@@ -89,7 +89,29 @@ pub(super) const ROTATION: Wanted = wanted(
     "VEC4 of float (5126), or of normalized byte (5120) or short (5122)",
 );
 
+/// Times of an animation's keys.
+pub(super) const KEY_TIMES: Wanted = wanted("input", &[Type::Scalar], &[F32], &[], "SCALAR of float (5126)");
+
 impl Wanted {
+    /// Values of an animation, `width` numbers each: floats, where they may be also normalised integers; bytes for what is
+    /// on or off.
+    pub fn animated(width: usize, is_switch: bool, or_integers: bool) -> Self {
+        let (shapes, shape): (&[Type], _) = match width {
+            1 => (&[Type::Scalar], "SCALAR"),
+            2 => (&[Type::Vec2], "VEC2"),
+            3 => (&[Type::Vec3], "VEC3"),
+            _ => (&[Type::Vec4], "VEC4"),
+        };
+        let (core, allowed): (&[Kind], _) = match (is_switch, or_integers) {
+            (true, _) => (&[U8, F32], "SCALAR of unsigned byte (5121), 0 or 1".to_owned()),
+            (_, true) => {
+                (&[F32, I8N, U8N, I16N, U16N], format!("{shape} of float (5126), or of normalized bytes or shorts"))
+            }
+            _ => (&[F32], format!("{shape} of float (5126)")),
+        };
+        Self { name: "output".into(), shapes, core, quantized: &[], allowed: allowed.into() }
+    }
+
     /// Set `set` of texture coordinates.
     pub fn tex_coord(set: u32) -> Self {
         Self {
@@ -97,7 +119,7 @@ impl Wanted {
             shapes: &[Type::Vec2],
             core: &[F32, U8N, U16N],
             quantized: &[I8, I8N, I16, I16N, U8, U16],
-            allowed: "VEC2 of float (5126), or of normalized unsigned byte (5121) or short (5123)",
+            allowed: "VEC2 of float (5126), or of normalized unsigned byte (5121) or short (5123)".into(),
         }
     }
 
@@ -108,7 +130,7 @@ impl Wanted {
             shapes: &[Type::Vec3, Type::Vec4],
             core: &[F32, U8N, U16N],
             quantized: &[],
-            allowed: "VEC3 or VEC4 of float (5126), or of normalized unsigned byte (5121) or short (5123)",
+            allowed: "VEC3 or VEC4 of float (5126), or of normalized unsigned byte (5121) or short (5123)".into(),
         }
     }
 
@@ -119,7 +141,7 @@ impl Wanted {
             shapes: &[Type::Vec4],
             core: &[U8, U16],
             quantized: &[],
-            allowed: "VEC4 of unsigned byte (5121) or short (5123), not normalized",
+            allowed: "VEC4 of unsigned byte (5121) or short (5123), not normalized".into(),
         }
     }
 
@@ -130,7 +152,7 @@ impl Wanted {
             shapes: &[Type::Vec4],
             core: &[F32, U8N, U16N],
             quantized: &[],
-            allowed: "VEC4 of float (5126), or of normalized unsigned byte (5121) or short (5123)",
+            allowed: "VEC4 of float (5126), or of normalized unsigned byte (5121) or short (5123)".into(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `PRT_shape`: an exact surface in place of a node's mesh.
 
-use super::{Document, Loader, Result, instancing, material, name_or};
+use super::{Document, Loader, Result, instancing, material, motion, name_or};
 use crate::scene::PlacedShape;
 use crate::shape::exact::ExactShape;
 use crate::shape::exact::profile::{Curve, Profile, ProfileError};
@@ -33,14 +33,14 @@ pub(super) fn place(loader: &mut Loader, node: &Node, i: usize, found: &Value, w
         loader.warn_once("exact shapes are placed by their nodes: skins do not move them");
     }
     let instances = node.extensions.as_ref().and_then(|e| e.others.get(instancing::NAME));
-    let worlds = match instances {
-        None => vec![world],
-        Some(found) => {
-            let at = format!("{node_at}/extensions/{}", instancing::NAME);
-            instancing::read(loader, found, &at)?.into_iter().map(|instance| world * instance).collect()
-        }
+    let below = match instances {
+        None => vec![DMat4::IDENTITY],
+        Some(found) => instancing::read(loader, found, &format!("{node_at}/extensions/{}", instancing::NAME))?,
     };
-    for world_from_object in worlds {
+    let corners = motion::box_corners(shape.bounds(&shape.object_from_unit()));
+    for below in below {
+        let world_from_object = world * below;
+        loader.trace.shapes.push((i, below, corners));
         if !world_from_object.is_finite() {
             let fix = "The product of the transforms above it is too large.";
             return Err(loader.doc.error(node_at, "the world transform of an instance is not finite", fix));

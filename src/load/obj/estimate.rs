@@ -59,7 +59,7 @@ pub(in crate::load) fn estimate(path: &Path, options: &LoadOptions) -> Option<Lo
         + counts.corners * CORNER
         + counts.triangles * TRIANGLE;
     let decoding = images(path, &start, options).map_or(0, |images| pictures(&images));
-    Some(LoadEstimate { bytes: length + (whole * meshes) as u64 + decoding, left_over: 0 })
+    Some(LoadEstimate { bytes: length + (whole * meshes) as u64 + decoding, left_over: 0, unmoved: 0 })
 }
 
 impl Counts {

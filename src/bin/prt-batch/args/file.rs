@@ -5,10 +5,11 @@
 
 use crate::parse;
 use clap::{Args, ValueHint};
-use prt::batch::{job::CameraChoice, names::NameTemplate};
+use prt::batch::{FrameChoice, job::CameraChoice, names::NameTemplate};
 use prt::color::{Exposure, ToneCurve};
 use prt::image::exr::{ExrCompression, ExrSamples};
 use prt::load::obj::ObjUp;
+use prt::load::{AnimationChoice, ShutterPosition};
 use prt::render::{AccelChoice, Brdf, CropWindow, DefaultLight, Filter, Integrator, Layers};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -18,6 +19,7 @@ const CAMERAS: &str = "Cameras";
 const LENS: &str = "Lens";
 const SAMPLING: &str = "Sampling";
 const LIGHT: &str = "Light";
+const ANIMATION: &str = "Animation";
 const FILES: &str = "Files";
 const OBJ: &str = "OBJ";
 
@@ -241,12 +243,44 @@ pub struct FileArgs {
     #[arg(allow_hyphen_values = true, help_heading = LIGHT)]
     pub sun_angle: f64,
 
-    /// Output name from {stem} {parent} {camera} [default: {stem}, with .{camera} if a file has several]
+    /// Frames of each file's animation [default: the file as written, no animation]
+    ///
+    /// all, or numbers and ranges: 12, 1-24, 1-100x2 (every second one), 1,5,9. Frame f is at f / --fps seconds; before
+    /// its first and after its last key each channel stays as it is there. all: from 0 to the frame at or after the last
+    /// key. A picture for each, of the same scene, whose meshes and images are read once; a file without animation gives
+    /// the same picture for each, with a warning. See "Animation" below.
+    #[arg(long, value_name = "all|1-24|1-100x2|1,5,9", value_parser = parse::frames, allow_hyphen_values = true)]
+    #[arg(help_heading = ANIMATION)]
+    pub frames: Option<FrameChoice>,
+    /// Frames a second [default: 24]
+    ///
+    /// From 0.001 to 1e6.
+    #[arg(long, value_name = "N", value_parser = parse::fps, allow_hyphen_values = true, help_heading = ANIMATION)]
+    pub fps: Option<f64>,
+    /// Which of a file's animations: an index, a name or all [default: 0]
+    ///
+    /// all: all at once; where two of them move one thing, the first does. A file that has animations and not this one
+    /// fails.
+    #[arg(long, value_name = "INDEX|NAME|all", value_parser = parse::animation, help_heading = ANIMATION)]
+    pub animation: Option<AnimationChoice>,
+    /// Share of a frame that the shutter is open, from 0 to 1 [default: from the file, else 0]
+    ///
+    /// The file says it by prt_shutter in the extras of a camera or its node. What moves meanwhile is blurred.
+    #[arg(long, value_name = "FRACTION", value_parser = parse::shutter, allow_hyphen_values = true)]
+    #[arg(help_heading = ANIMATION)]
+    pub shutter: Option<f64>,
+    /// Where the open shutter lies: before, about or after the frame's time [default: center]
+    ///
+    /// start: it opens at the frame's time; end: it closes then.
+    #[arg(long, value_name = "WHERE", value_parser = parse::shutter_position(), help_heading = ANIMATION)]
+    pub shutter_position: Option<ShutterPosition>,
+
+    /// Output name from {stem} {parent} {camera} {frame} [default: {stem}, with .{camera} if a file has several, with .{frame:04} if there are several]
     ///
     /// "/" in it makes sub-folders. {camera} is the camera's name made fit for a file (else its index), 0 for the one
     /// framed on the bounds. Without --name the same stem of another type in one folder adds its extension
-    /// (cornell.obj.exr): of a.gltf, a.glb and a.obj the first that is there keeps the plain name. {frame} is not
-    /// built; .{frame:04} will be added when there are several frames.
+    /// (cornell.obj.exr): of a.gltf, a.glb and a.obj the first that is there keeps the plain name. {frame} is the
+    /// frame's number, 0 without --frames; {frame:04} has four digits at least.
     #[arg(long, value_name = "TEMPLATE", value_parser = parse::name, help_heading = FILES)]
     pub name: Option<NameTemplate>,
     /// Sample type of the EXR

@@ -94,6 +94,7 @@ fn text(plan: &Explanation) -> String {
         );
         lines.list("ends", plan.stopping.iter().map(stopping_text));
         lines.add("scene", scene.to_string());
+        lines.list("frame", plan.frame.iter().map(u32::to_string));
     }
     if let Some(camera) = &plan.camera {
         lines.add("camera", camera_text(camera));

@@ -36,7 +36,7 @@ pub(super) struct Read {
 }
 
 /// The texture coordinates along whose u tangents run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Along {
     /// Place in [`Read::tex_coords`].
     pub set: usize,
