@@ -1,5 +1,6 @@
 //! Lenses and integrators, as users and their scripts meet them: options, extras, files, JSON, messages.
 
+use exr::meta::attribute::Text;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -50,7 +51,7 @@ fn refused(folder: &Path, args: &[&str], code: i32, says: &[&str]) {
 fn attributes(folder: &Path) -> (Option<f32>, Option<f32>, Option<String>) {
     let meta = exr::meta::MetaData::read_from_file(folder.join("renders/a.exr"), false).unwrap();
     let attributes = &meta.headers[0].own_attributes;
-    let lens = match attributes.other.get(&"prt:lens".into()) {
+    let lens = match attributes.other.get(&Text::from("prt:lens")) {
         Some(exr::meta::attribute::AttributeValue::Text(text)) => Some(text.to_string()),
         _ => None,
     };
@@ -59,7 +60,7 @@ fn attributes(folder: &Path) -> (Option<f32>, Option<f32>, Option<String>) {
 
 fn integrator_of(folder: &Path) -> String {
     let meta = exr::meta::MetaData::read_from_file(folder.join("renders/a.exr"), false).unwrap();
-    match meta.headers[0].own_attributes.other.get(&"prt:integrator".into()) {
+    match meta.headers[0].own_attributes.other.get(&Text::from("prt:integrator")) {
         Some(exr::meta::attribute::AttributeValue::Text(text)) => text.to_string(),
         other => panic!("{other:?}"),
     }

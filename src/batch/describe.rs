@@ -79,7 +79,7 @@ pub(super) fn describe(frame: &Frame, image: &mut ImageReport) {
                 .into(),
         );
     }
-    let has = |name| stats.features.iter().any(|feature| *feature == (name, true));
+    let has = |name| stats.features.contains(&(name, true));
     if image.integrator.as_deref() == Some(Integrator::Whitted.name())
         && (has("emissive_surfaces") || has("environment"))
     {

@@ -121,7 +121,3 @@ impl Layered<'_> {
         sample.valid.any().then_some(sample)
     }
 }
-
-#[cfg(test)]
-#[path = "bsdf_mirrors_tests.rs"]
-mod tests;

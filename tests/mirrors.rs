@@ -1,8 +1,11 @@
-use super::*;
-use crate::material::bsdf::View;
-use crate::material::energy::{Brdf, Energy};
-use crate::material::surface::{Extras, Surface};
-use simd::Uint;
+//! All mirrors of a smooth surface, as tracers follow them that leave nothing to chance, against sampling them.
+
+use prt::material::bsdf::{Bsdf, Mirror, View};
+use prt::material::energy::{Brdf, Energy};
+use prt::material::layered::Layered;
+use prt::material::surface::{Extras, Surface};
+use prt::math::{Frame, V3};
+use simd::{Float, Lanes, Mask, Scalar, Uint};
 use std::sync::LazyLock;
 
 type F = <Scalar as Lanes>::F;
@@ -12,6 +15,7 @@ type M = <Scalar as Lanes>::M;
 static ENERGY: LazyLock<Energy> = LazyLock::new(|| {
     let mut energy = Energy::new(Brdf::Full);
     energy.class(1.5);
+    energy.add_glass();
     energy
 });
 
