@@ -19,14 +19,21 @@ struct Points {
     offset: [f32; MOST],
 }
 
-/// Points of the hits `at ..` whose bits are set, by their primitive numbers.
+/// Points of the hits `at ..` whose bits are set, by their primitive numbers and the times of their rays.
 #[inline(never)]
-fn points(tables: &SceneTables, hits: &HitBatch, at: usize, bits: u32, primitives: &[u32; MOST]) -> Points {
+fn points(
+    tables: &SceneTables,
+    hits: &HitBatch,
+    at: usize,
+    bits: u32,
+    primitives: &[u32; MOST],
+    times: &[f32; MOST],
+) -> Points {
     const ZERO: [f32; MOST] = [0.0; MOST];
     let mut points = Points { p: [ZERO; 3], ng: [ZERO; 3], du: [ZERO; 3], dv: [ZERO; 3], uv: [ZERO; 2], offset: ZERO };
     for (lane, &primitive) in primitives.iter().enumerate().filter(|(lane, _)| bits >> lane & 1 == 1) {
         let Some(shape) = tables.shapes.get(primitive) else { continue };
-        let point = shape.point(hits.u[at + lane], hits.v[at + lane], 0.0);
+        let point = shape.point(hits.u[at + lane], hits.v[at + lane], times[lane]);
         for axis in 0..3 {
             points.p[axis][lane] = point.p[axis];
             points.ng[axis][lane] = point.ng[axis];
@@ -44,13 +51,14 @@ fn load<L: Lanes>(v: &[[f32; MOST]; 3]) -> V3<L> {
     V3::new(L::F::load(&v[0], 0), L::F::load(&v[1], 0), L::F::load(&v[2], 0))
 }
 
-/// Makes the lanes of `si` that hit shapes (`primitive` of the hits `at ..` in the lanes `hit`) what is there.
+/// Makes the lanes of `si` that hit shapes (`primitive` of the hits `at ..` in the lanes `hit`, by rays at `time`) what is
+/// there.
 #[inline(always)]
 pub(super) fn put<L: Lanes>(
     tables: &SceneTables,
     hits: &HitBatch,
     at: usize,
-    primitive: L::U,
+    (primitive, time): (L::U, L::F),
     hit: L::M,
     si: &mut Interaction<L>,
 ) {
@@ -58,9 +66,10 @@ pub(super) fn put<L: Lanes>(
     if !here.any() {
         return;
     }
-    let mut primitives = [0; MOST];
+    let (mut primitives, mut times) = ([0; MOST], [0.0; MOST]);
     primitive.store(&mut primitives, 0);
-    let points = points(tables, hits, at, here.bits(), &primitives);
+    time.store(&mut times, 0);
+    let points = points(tables, hits, at, here.bits(), &primitives, &times);
     let (p, ng) = (load::<L>(&points.p), load::<L>(&points.ng));
     let front = si.wo.dot(ng).gt(L::F::zero());
     si.on_shape = here;

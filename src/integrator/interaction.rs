@@ -134,7 +134,8 @@ impl<L: Lanes> Part<L> for Interact<'_, L> {
             on_shape: none,
         };
         if !tables.shapes.is_empty() {
-            exact::put(tables, hits, at, primitive, hit, &mut si);
+            // Rays have no times yet: all are at the shutter's opening.
+            exact::put(tables, hits, at, (primitive, zero), hit, &mut si);
         }
         si
     }
