@@ -19,7 +19,7 @@ struct Points {
     offset: [f32; MOST],
 }
 
-/// Points of the hits `at ..` whose bits are set, by their primitive numbers.
+/// Points of the hits `at ..` whose bits are set, by their primitive numbers and the times of their rays.
 #[inline(never)]
 fn points(
     tables: &SceneTables,
@@ -65,9 +65,8 @@ pub(super) fn put<L: Lanes>(
     if !here.any() {
         return;
     }
-    let mut primitives = [0; MOST];
+    let (mut primitives, mut times) = ([0; MOST], [0.0; MOST]);
     primitive.store(&mut primitives, 0);
-    let mut times = [0.0; MOST];
     si.time.store(&mut times, 0);
     let points = points(tables, hits, at, here.bits(), &primitives, &times);
     let (p, ng) = (load::<L>(&points.p), load::<L>(&points.ng));
