@@ -8,7 +8,7 @@ mod support;
 
 use glam::{DMat4, DVec3, Vec3};
 use prt::accel::wide::WideBvh;
-use prt::camera::{Camera, Projection};
+use prt::camera::{Camera, Lens, Projection};
 use prt::light::{Environment, Light};
 use prt::material::Material;
 use prt::render::{AccelChoice, DefaultLight, Frame, RenderSettings, prepare};
@@ -33,6 +33,7 @@ fn look_down_z(builder: &mut SceneBuilder) {
         name: String::new(),
         world_from_camera: DMat4::from_translation(DVec3::Z * 10.0),
         projection: Projection::Orthographic { xmag: 4.0, ymag: 4.0 },
+        lens: Lens::default(),
     });
 }
 

@@ -207,7 +207,7 @@ fn crossings_of_a_closed_surface_come_in_pairs() {
         let (o, d) = (vector(&mut rng, 1.5), direction(&mut rng, i));
         if d != DVec3::ZERO {
             let found = crossings(&ball, o, d).found;
-            assert!(found.len() % 2 == 0, "{o:?} {d:?}: {found:?}");
+            assert!(found.len().is_multiple_of(2), "{o:?} {d:?}: {found:?}");
             crossed += found.len() / 2;
         }
     }
