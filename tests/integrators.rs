@@ -215,7 +215,7 @@ fn whitted_takes_lamps_and_skies_for_points() {
     let wanted = f64::from(ALBEDO) / PI * 50.0 * 0.04 * (2.0 / d2.sqrt()).powi(2) / d2;
     assert_near("lamp", mean(&scene, Integrator::Whitted, 2, 1), wanted, 5e-3);
     // An even sky: the cosines of its 16 directions add up to about what they must.
-    scene.meshes[1].indices.clear();
+    std::sync::Arc::make_mut(&mut scene.meshes[1]).indices.clear();
     scene.environment = Some(Environment::new(8, 4, [[1.0; 3]; 32]));
     assert_near("sky", mean(&scene, Integrator::Whitted, 2, 1), f64::from(ALBEDO), 0.15);
 }
