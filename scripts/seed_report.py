@@ -47,8 +47,10 @@ def without_normal_map(doc):
 
 
 def flat(doc):
-    for primitive in primitives(doc, "torus knot"):
-        del primitive["attributes"]["NORMAL"]
+    still(doc)
+    # The ball, 2,208 triangles: on the knot's 72,960 hardly anything shows.
+    for primitive in primitives(doc, "flying ball"):
+        primitive["attributes"] = {k: v for k, v in primitive["attributes"].items() if k != "NORMAL"}
 
 
 def matte(doc):
@@ -81,22 +83,29 @@ def point_light(doc):
     doc["extensionsUsed"] = sorted(set(doc.get("extensionsUsed", [])) | {"KHR_lights_punctual"})
 
 
+def opened(doc):
+    # In a closed room no direction is open.
+    names = {"ceiling", "ceiling lamp", "left wall", "right wall", "front wall"}
+    scene = doc["scenes"][0]
+    scene["nodes"] = [i for i in scene["nodes"] if doc["nodes"][i].get("name") not in names]
+
+
 KNOT, FLOOR, WALL, BALL = "190,130,240,180", "120,400,240,140", "470,120,240,180", "640,200,240,180"
-BOTTLE, MIRROR, TOP, LEFT = "430,200,240,180", "360,300,240,180", "300,0,240,180", "170,110,80,60"
+MIRROR, TOP = "360,300,240,180", "300,0,240,180"
 # name: the change of the scene, the window, further options. Two of a kind are before and after.
 PICTURES = {
     "whole": (None, None, []),
     "principled-before": (matte, KNOT, []), "principled": (None, KNOT, []),
     "texture-before": (untextured, FLOOR, []), "texture": (None, FLOOR, []),
     "normal-map-before": (without_normal_map, WALL, []), "normal-map": (None, WALL, []),
-    "normals-before": (flat, "230,180,120,90", []), "normals": (None, "230,180,120,90", []),
+    "normals-before": (flat, BALL, []), "normals": (still, BALL, []),
     "motion-before": (still, BALL, []), "motion": (None, BALL, []),
-    "lens-before": (pinhole, LEFT, []), "lens": (None, LEFT, []),
+    "lens-before": (pinhole, KNOT, []), "lens": (None, KNOT, []),
     "revolution-before": (tessellated, "490,215,120,90", []), "revolution": (None, "490,215,120,90", []),
     "ideal": (None, MIRROR, []),
     "area-light-before": (point_light, FLOOR, []), "area-light": (None, FLOOR, []),
     "next-event": (None, TOP, ["--integrator", "direct"]),
-    "cosine": (None, None, ["--integrator", "ao"]),
+    "cosine": (opened, None, ["--integrator", "ao"]),
     "tent-before": (None, "490,215,60,45", ["--filter", "box:0.01", "--spp", "1"]), "tent": (None, "490,215,60,45", []),
 }
 
