@@ -84,7 +84,7 @@ impl Lens {
     /// distance is said, it is asked for.
     ///
     /// # Errors
-    /// As [`Self::optics`].
+    /// As `optics`.
     pub fn thin(
         &self,
         projection: &Projection,

@@ -13,7 +13,7 @@
 //! F is made anew of the halved A and r instead of being halved itself. Rays that hardly rise meet the front and the back
 //! of a surface at nearly the same u, d.y apart, where F is about d.y^2; A there is exact to 1e-16 whatever d.y is, and so
 //! F to 1e-16 d.y, relative to itself 1e-16 / d.y. Such pieces are divided where the line is nearest to the axis, which is
-//! between the two. Rays of less than [`LEVEL`] are taken as level: the heights y(u) = o.y, then a quadratic.
+//! between the two. Rays of less than `LEVEL` are taken as level: the heights y(u) = o.y, then a quadratic.
 //!
 //! What touches without crossing, or goes less than about 1e-7 of the size deep along the line, is no hit: crossings come
 //! and go in pairs.
