@@ -58,7 +58,7 @@ if [ ${#scenes[@]} -eq 0 ]; then
 else
   # The dev profile is optimised and keeps the checks of debug builds.
   cargo build --locked --quiet --bin prt-batch
-  target/debug/prt-batch scenes --out "$work/renders" --size 64x36 --spp 2 --progress none
+  "${CARGO_TARGET_DIR:-target}/debug/prt-batch" scenes --out "$work/renders" --size 64x36 --spp 2 --progress none
   pictures=()
   while IFS= read -r -d '' picture; do pictures+=("$picture"); done < <(find "$work/renders" -name '*.exr' -print0 | sort -z)
   if [ ${#pictures[@]} -lt ${#scenes[@]} ]; then
